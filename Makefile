@@ -1,0 +1,70 @@
+# `make run` and `make test` do everything: both set up .venv first, and again after a change of the requirements.
+# uv is used where it is installed, venv and pip elsewhere. `make PYTHON=/path/to/python ...` names the interpreter.
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+UV := $(shell command -v uv 2>/dev/null)
+# The first of these that is new enough makes the environment.
+PYTHON ?= python3.13 python3.12 python3.11 python3
+CAMPAIGN ?= campaigns/almeida_2010.toml
+# SLOW=1 adds the tests marked slow.
+SLOW ?=
+PYTEST_ARGS ?=
+
+# What an interpreter must offer: uv brings its own installer, pip comes from the interpreter's ensurepip.
+SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
+
+.DEFAULT_GOAL := help
+.PHONY: help setup run test test-slow lint format clean
+
+help: ## List the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(STAMP) ## Create .venv with the package and its development tools
+
+$(STAMP): pyproject.toml constraints.txt
+	@if ! $(BIN)/python -c 'import sys' 2>/dev/null; then \
+	  for candidate in $(PYTHON); do \
+	    if "$$candidate" -c '$(SUITABLE)' 2>/dev/null; then python="$$candidate"; break; fi; \
+	  done; \
+	  if [ -z "$$python" ]; then \
+	    echo "make: no Python >= 3.11 with venv and ensurepip among: $(PYTHON); install one, or say make PYTHON=/path/to/python" >&2; \
+	    exit 1; \
+	  fi; \
+	  rm -rf $(VENV); \
+	  if [ -n "$(UV)" ]; then \
+	    "$(UV)" venv --quiet --python "$$("$$python" -c 'import sys; print(sys.executable)')" $(VENV); \
+	  else \
+	    "$$python" -m venv $(VENV); \
+	  fi; \
+	fi
+	@echo "setting up $(VENV) ($(if $(UV),uv,pip))"
+ifneq ($(UV),)
+	@"$(UV)" pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[dev]'
+else
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+endif
+	@touch $@
+
+run: $(STAMP) ## Run the campaign of the 2010 paper (CAMPAIGN=... for another)
+	@$(BIN)/workbench run $(CAMPAIGN)
+
+test: lint ## Check style and types, then run the tests (SLOW=1: all of them)
+	$(BIN)/pytest -n 2 --dist worksteal $(if $(SLOW),-m "slow or not slow") $(PYTEST_ARGS)
+
+test-slow: $(STAMP) ## Run only the tests marked slow
+	$(BIN)/pytest -m slow $(PYTEST_ARGS)
+
+lint: $(STAMP) ## Check style and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy --strict src
+
+format: $(STAMP) ## Put the code into shape
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean: ## Remove .venv, caches and builds
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
