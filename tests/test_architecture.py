@@ -254,7 +254,7 @@ def test_committed_files_hold_no_trace_of_a_machine(repository: Path) -> None:
         "see /" + "home/ann/model.xml",
         "path = '/" + "root/.cache'",
         "C:" + "\\Users\\ann",
-        "https://" + "pypi.org/simple",
+        "https://py" + "pi.org/simple",
         "files.python" + "hosted.org",
         "--index" + "-url https://mirror.example/simple",
         "https://" + "artifactory.example.com/api",
