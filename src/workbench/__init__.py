@@ -1,0 +1,39 @@
+"""Validate closed-form dynamics of parallel robots against MuJoCo.
+
+>>> import workbench as wb
+>>> mech = wb.load_mechanism("models/asym_2rss_ppap.xml", payload=0.5)
+>>> ref = wb.MujocoReference("models/asym_2rss_ppap.xml", payload=0.5)
+
+Names are imported when first used, so that ``import workbench`` stays light.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from workbench.errors import WorkbenchError
+    from workbench.mjcf import load_mechanism
+    from workbench.reference import MujocoReference
+
+__version__ = "0.1.0"
+__all__ = ["MujocoReference", "WorkbenchError", "__version__", "load_mechanism"]
+
+_HOMES = {
+    "MujocoReference": "workbench.reference",
+    "WorkbenchError": "workbench.errors",
+    "load_mechanism": "workbench.mjcf",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for."""
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'workbench' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Public names, loaded or not."""
+    return sorted(__all__)

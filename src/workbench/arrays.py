@@ -1,0 +1,79 @@
+"""Checks of array arguments at the public surface: the one place that says argument, expected, got."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from workbench.errors import ArrayError
+
+FloatArray = NDArray[np.float64]
+
+
+def as_batch(name: str, value: ArrayLike, columns: int = 3) -> FloatArray:
+    """Return *value* as a finite, C-contiguous float64 array of shape ``(n, columns)``.
+
+    Parameters
+    ----------
+    name
+        The argument's name, for the message.
+    value
+        Anything NumPy makes an array of. One sample of shape ``(columns,)`` is refused: batch first, always.
+    columns
+        The demanded number of columns.
+
+    Raises
+    ------
+    ArrayError
+        Wrong shape, not numeric, or not finite; the message names the first bad sample.
+    """
+    try:
+        array = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArrayError(f"{name}: expected numbers of shape (n, {columns}), got {type(value).__name__}") from error
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise ArrayError(f"{name}: expected shape (n, {columns}), got {array.shape}", argument=name, shape=array.shape)
+    finite = np.isfinite(array)
+    if not finite.all():
+        sample, column = np.argwhere(~finite)[0]
+        raise ArrayError(
+            f"{name}: sample {sample}, column {column} is {array[sample, column]}; every entry must be finite",
+            argument=name,
+            sample=int(sample),
+        )
+    return array
+
+
+def as_batches(columns: int = 3, **arguments: ArrayLike) -> tuple[FloatArray, ...]:
+    """Check several arguments with `as_batch` and that they agree on the number of samples.
+
+    Raises
+    ------
+    ArrayError
+        As `as_batch`, or when the arguments' lengths differ.
+    """
+    arrays = {name: as_batch(name, value, columns) for name, value in arguments.items()}
+    lengths = {name: len(array) for name, array in arrays.items()}
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise ArrayError(f"arguments differ in their number of samples: {listed}", **lengths)
+    return tuple(arrays.values())
+
+
+def as_force(name: str, value: ArrayLike | None, samples: int) -> FloatArray:
+    """Return an external force as shape ``(samples, 3)``: None is zero, one vector ``(3,)`` holds for all samples.
+
+    Raises
+    ------
+    ArrayError
+        Any other shape, or entries that are not finite.
+    """
+    if value is None:
+        return np.zeros((samples, 3))
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape == (3,):
+        array = np.broadcast_to(array, (samples, 3))
+    checked = as_batch(name, array)
+    if len(checked) != samples:
+        raise ArrayError(f"{name}: expected shape (3,) or ({samples}, 3), got {array.shape}", argument=name)
+    return checked

@@ -1,0 +1,250 @@
+"""The asymmetric 2RSS+PPaP pick-and-place robot of [Almeida2010].
+
+Frame: the paper's, x3 down, gravity (0, 0, +g). Left limb A-C-E is driven by q2, right limb B-D-F by q3, the slider of
+the central limb by q1. The equations stand in `asym_2rss_ppap_kernel`; this module gives them names, units, checks and
+errors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from workbench.arrays import FloatArray, as_batch, as_batches
+from workbench.errors import MotionError, ParameterError
+from workbench.mechanisms import asym_2rss_ppap_kernel as kernel
+from workbench.mechanisms import asym_2rss_ppap_literal as literal
+from workbench.mechanisms.asym_2rss_ppap_parameters import PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
+from workbench.mechanisms.base import Candidate, Mechanism, ParameterInfo, Target, UniformRule
+
+SINGULAR = 1e-6
+"""A pose counts as singular when a determinant, divided by the lengths it is made of, is below this: torques there are
+a million times the forces that cause them."""
+
+BAR_INERTIA = {"distributed": 1.0, "lumped": 0.0}
+ELBOWS = ("out", "in")
+
+
+class Asym2rssPpap(Mechanism):
+    """Closed-form kinematics and inverse dynamics of the 2RSS+PPaP robot."""
+
+    name: ClassVar[str] = "asym_2rss_ppap"
+    title: ClassVar[str] = "Asymmetric 2RSS+PPaP pick-and-place robot"
+    reference_key: ClassVar[str] = "Almeida2010"
+    joints: ClassVar[tuple[str, ...]] = ("q1", "q2", "q3")
+    coordinate_units: ClassVar[tuple[str, ...]] = ("m", "rad", "rad")
+    force_units: ClassVar[tuple[str, ...]] = ("N", "N m", "N m")
+    platform_axes: ClassVar[tuple[str, ...]] = ("x1", "x2", "x3")
+    parameter_table: ClassVar[tuple[ParameterInfo, ...]] = PARAMETERS
+    targets: ClassVar[tuple[Target, ...]] = TARGETS
+    uniform_rules: ClassVar[tuple[UniformRule, ...]] = UNIFORM_RULES
+    parameter_type: ClassVar[type] = Parameters
+
+    def __init__(self, parameters: Any) -> None:
+        """Build from `Parameters`; see `Mechanism`."""
+        super().__init__(parameters)
+        self._constants = {model: kernel.pack(parameters, factor) for model, factor in BAR_INERTIA.items()}
+
+    def forward_kinematics(self, q: ArrayLike) -> FloatArray:
+        """Platform position on the branch where the platform hangs (larger x3); [Almeida2010] eq. (1).
+
+        Parameters
+        ----------
+        q
+            Actuated coordinates ``(n, 3)``: m, rad, rad.
+
+        Returns
+        -------
+        numpy.ndarray
+            x ``(n, 3)`` in metres, paper frame.
+
+        Raises
+        ------
+        MotionError
+            A sample outside the workspace or at a singular pose, with its index and the joint.
+        """
+        array = as_batch("q", q)
+        zero = np.zeros_like(array)
+        return self._motion(array, zero, zero)[0]
+
+    def inverse_kinematics(self, x: ArrayLike, elbows: tuple[str, str] = ("out", "out")) -> FloatArray:
+        """Actuated coordinates from platform positions.
+
+        Parameters
+        ----------
+        x
+            Platform positions ``(n, 3)`` in metres, paper frame.
+        elbows
+            Branch of the left and of the right arm: ``"out"``, away from the platform, as in the paper, or ``"in"``.
+
+        Raises
+        ------
+        MotionError
+            A position that an arm or the parallelogram cannot reach; the message names sample and joint.
+        ParameterError
+            Unknown elbow branch.
+        """
+        p = self._parameters
+        points = as_batch("x", x)
+        for elbow in elbows:
+            if elbow not in ELBOWS:
+                raise ParameterError(f'unknown elbow branch "{elbow}"; valid: {", ".join(ELBOWS)}')
+        x1, x2, x3 = points.T
+        q = np.empty_like(points)
+        q[:, 0] = x1
+        sides = (
+            ("q2", -(x2 + p.L_left - p.l_left), p.a1_left, p.a2_left, elbows[0]),
+            ("q3", x2 - (p.L_right - p.l_right), p.a1_right, p.a2_right, elbows[1]),
+        )
+        for column, (joint, outward, a1, a2, elbow) in enumerate(sides, start=1):
+            # the arm points along (cos q, sin q) in (outward, x3); |p - a1 d|^2 + x1^2 = a2^2 gives its angle to p
+            distance = np.hypot(outward, x3)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                cosine = (distance**2 + x1**2 + a1**2 - a2**2) / (2 * a1 * distance)
+                angle = np.arccos(cosine)
+            self._refuse(~np.isfinite(angle), joint, "position is out of reach of the limb", points, "x")
+            q[:, column] = np.arctan2(x3, outward) + (-angle if elbow == "out" else angle)
+        self._refuse(np.abs(x2) >= p.a5, "q1", f"|x2| reaches the parallelogram's length {p.a5:g} m", points, "x")
+        return q
+
+    def jacobian(self, q: ArrayLike) -> FloatArray:
+        """J = J_x^-1 J_q, shape ``(n, 3, 3)``, with xd = J qd; [Almeida2010] eq. (2), with the sign of J_q33 mended."""
+        array = as_batch("q", q)
+        zero = np.zeros_like(array)
+        return self._motion(array, zero, zero)[3]
+
+    def platform_motion(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Position, velocity and acceleration of the platform, each ``(n, 3)``, SI, paper frame."""
+        x, xd, xdd, _, _ = self._motion(*as_batches(q=q, qd=qd, qdd=qdd))
+        return x, xd, xdd
+
+    def joint_motion(self, x: ArrayLike, xd: ArrayLike, xdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Actuated motion from a platform motion, elbows out.
+
+        Raises
+        ------
+        MotionError
+            A sample out of reach, or an arm in line with its rod (J_q singular).
+        """
+        points, velocities, accelerations = as_batches(x=x, xd=xd, xdd=xdd)
+        p = self._parameters
+        q = self.inverse_kinematics(points)
+        qd, qdd = np.empty_like(q), np.empty_like(q)
+        qd[:, 0], qdd[:, 0] = velocities[:, 0], accelerations[:, 0]
+        sides = (("q2", 1, -1.0, p.L_left, p.l_left, p.a1_left), ("q3", 2, 1.0, p.L_right, p.l_right, p.a1_right))
+        for joint, column, side, base, platform, a1 in sides:
+            sine, cosine = np.sin(q[:, column]), np.cos(q[:, column])
+            still = np.zeros_like(sine)
+            tip = np.stack([still, side * (base + a1 * cosine), a1 * sine], axis=1)
+            tangent = np.stack([still, -side * a1 * sine, a1 * cosine], axis=1)
+            inward = np.stack([still, -side * a1 * cosine, -a1 * sine], axis=1)
+            rod = points + [0.0, side * platform, 0.0] - tip
+            lever = np.sum(rod * tangent, axis=1)
+            short = np.abs(lever) < SINGULAR * a1 * np.linalg.norm(rod, axis=1)
+            self._refuse(short, joint, "singular pose: arm and rod in line (J_q)", points, "x")
+            rate = np.sum(rod * velocities, axis=1) / lever
+            relative = velocities - tangent * rate[:, None]
+            needed = np.sum(rod * (accelerations - inward * rate[:, None] ** 2), axis=1)
+            qd[:, column] = rate
+            qdd[:, column] = (needed + np.sum(relative**2, axis=1)) / lever
+        return q, qd, qdd
+
+    def singularity_measures(self, q: ArrayLike) -> dict[str, FloatArray]:
+        """``det J_x``, ``J_q22`` and ``J_q33``, each ``(n,)`` and divided by the lengths of the bars involved."""
+        array = as_batch("q", q)
+        zero = np.zeros_like(array)
+        return self._scaled(self._motion(array, zero, zero)[4])
+
+    def torques(
+        self, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, external_force: FloatArray
+    ) -> FloatArray:
+        """Inverse dynamics on checked arrays; see `Mechanism.inverse_dynamics`."""
+        tau = np.empty_like(q)
+        kernel.torques_batch(self._constants[mass_model], q, qd, qdd, external_force, tau)
+        if not np.isfinite(tau).all():
+            self._motion(q, qd, qdd)  # names the sample and the joint
+        return tau
+
+    def _motion(
+        self, q: FloatArray, qd: FloatArray, qdd: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """x, xd, xdd, J and the raw determinants on checked arrays; refuses samples that are no pose."""
+        n = len(q)
+        x, xd, xdd, determinants = (np.empty((n, 3)) for _ in range(4))
+        jacobian = np.empty((n, 3, 3))
+        kernel.motion_batch(self._constants["distributed"], q, qd, qdd, x, xd, xdd, jacobian, determinants)
+        p = self._parameters
+        rod = min(p.a2_left, p.a2_right)
+        self._refuse(np.abs(q[:, 0]) > rod, "q1", f"|q1| exceeds the rod length {rod:g} m", q, "q")
+        self._refuse(np.isnan(x).any(axis=1), "q2, q3", "the rods cannot meet at the platform", q, "q")
+        self._refuse(np.abs(x[:, 1]) >= p.a5, "q2, q3", f"|x2| reaches the parallelogram's length {p.a5:g} m", q, "q")
+        joints = {"det J_x": "q2, q3", "J_q22": "q2", "J_q33": "q3"}
+        for measure, value in self._scaled(determinants).items():
+            what = f"singular pose: |{measure}| below {SINGULAR:g} of its scale"
+            self._refuse(np.abs(value) < SINGULAR, joints[measure], what, q, "q")
+        return x, xd, xdd, jacobian, determinants
+
+    def _scaled(self, determinants: FloatArray) -> dict[str, FloatArray]:
+        p = self._parameters
+        return {
+            "det J_x": determinants[:, 0] / (p.a2_left * p.a2_right),
+            "J_q22": determinants[:, 1] / (p.a1_left * p.a2_left),
+            "J_q33": determinants[:, 2] / (p.a1_right * p.a2_right),
+        }
+
+    @staticmethod
+    def _refuse(bad: np.ndarray[Any, np.dtype[np.bool_]], joint: str, what: str, values: FloatArray, name: str) -> None:
+        if bad.any():
+            sample = int(np.argmax(bad))
+            shown = ", ".join(f"{value:.6g}" for value in values[sample])
+            raise MotionError(
+                f"sample {sample}, joint {joint}: {what} at {name} = ({shown})",
+                sample=sample,
+                joint=joint,
+                reason=what,
+                value=values[sample].tolist(),
+            )
+
+
+def _kernel_candidate(mass_model: str) -> Candidate:
+    return Candidate(
+        name=mass_model,
+        mass_model=mass_model,
+        function=lambda mech, q, qd, qdd, force: mech.inverse_dynamics(q, qd, qdd, mass_model, force),
+        description=f"virtual work in end-point coordinates, {mass_model} masses",
+        source="docs/derivations/asym_2rss_ppap.md",
+    )
+
+
+def _literal_candidate(name: str, mass_model: str, function: Any, description: str, source: str) -> Candidate:
+    def torques(
+        mech: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray
+    ) -> FloatArray:
+        result: FloatArray = function(
+            mech.parameters, q, qd, qdd, *mech.platform_motion(q, qd, qdd), external_force=external_force
+        )
+        return result
+
+    return Candidate(name, mass_model, torques, description, source)
+
+
+Asym2rssPpap.candidates = {
+    candidate.name: candidate
+    for candidate in (
+        _kernel_candidate("lumped"),
+        _kernel_candidate("distributed"),
+        _literal_candidate(
+            "lumped-appendix", "lumped", literal.lumped_appendix, "K1 to K6 of the appendix, repaired",
+            "[Almeida2010] appendix",
+        ),
+        _literal_candidate(
+            "distributed-rotation", "distributed", literal.distributed_rotation,
+            "rotation matrices and angular accelerations", "[Almeida2010] eq. (4)-(15)",
+        ),
+    )
+}  # fmt: skip

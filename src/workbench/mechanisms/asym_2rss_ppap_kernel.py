@@ -1,0 +1,183 @@
+"""The equations of the asymmetric 2RSS+PPaP robot, once: scalar code that numba compiles.
+
+Every mass model, every batch size and the kinematics go through `_kinematics` and `_torques`; a mass model is nothing
+but other constants (`pack`), because in end-point coordinates (proximal end, distal end) a straight bar that does not
+spin about its axis has the constant mass matrix
+
+    [[m (1-k)^2 + I/len^2,  m k (1-k) - I/len^2],
+     [m k (1-k) - I/len^2,  m k^2 + I/len^2    ]]
+
+with mass m, mass centre at the fraction k and transverse inertia I (docs/derivations/asym_2rss_ppap.md, section 4).
+Lumped masses are I = 0. Frame: the paper's, x3 down. Points A, C, E belong to the left limb, B, D, F to the right one;
+u = E - C and w = F - D are the rods. Numbers follow docs/notation.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from workbench.arrays import FloatArray
+
+CONSTANTS = 21
+
+
+def pack(p: Any, bar_inertia: float = 1.0) -> FloatArray:
+    """Return the kernel's constants from the parameters.
+
+    Parameters
+    ----------
+    p
+        Parameters of the mechanism (`workbench.mechanisms.asym_2rss_ppap.Parameters`), SI.
+    bar_inertia
+        Factor on every bar's rotational inertia: 1 for distributed masses, 0 for lumped ones.
+    """
+    i1_left, i1_right = bar_inertia * p.I1_left / p.a1_left**2, bar_inertia * p.I1_right / p.a1_right**2
+    i2_left, i2_right = bar_inertia * p.I2_left / p.a2_left**2, bar_inertia * p.I2_right / p.a2_right**2
+    i5 = bar_inertia * p.I5 / p.a5**2
+    constants = (
+        p.L_left - p.l_left,
+        p.L_right - p.l_right,
+        p.a1_left,
+        p.a1_right,
+        p.a2_left**2,
+        p.a2_right**2,
+        # left limb: C with C (arm and rod), C with E, E with E, weight at C
+        p.m1_left * p.k1_left**2 + i1_left + p.m2_left * (1 - p.k2_left) ** 2 + i2_left,
+        p.m2_left * p.k2_left * (1 - p.k2_left) - i2_left,
+        p.m2_left * p.k2_left**2 + i2_left,
+        p.g * (p.m1_left * p.k1_left + p.m2_left * (1 - p.k2_left)),
+        # right limb: D with D, D with F, F with F, weight at D
+        p.m1_right * p.k1_right**2 + i1_right + p.m2_right * (1 - p.k2_right) ** 2 + i2_right,
+        p.m2_right * p.k2_right * (1 - p.k2_right) - i2_right,
+        p.m2_right * p.k2_right**2 + i2_right,
+        p.g * (p.m1_right * p.k1_right + p.m2_right * (1 - p.k2_right)),
+        # platform with payload; all weight that hangs on the platform
+        p.m3 + p.payload,
+        p.g * (p.m3 + p.payload + p.m2_left * p.k2_left + p.m2_right * p.k2_right),
+        # what travels along x1 only with q1: slider, parallelogram, coupler
+        p.m4 + p.m5 + p.m6,
+        # swing of the parallelogram: squared length, inertia at the coupler, weight at the coupler
+        p.a5**2,
+        p.m5 * p.k5**2 + i5 + p.m6,
+        p.g * (p.m5 * p.k5 + p.m6),
+        0.0,
+    )
+    return np.array(constants, dtype=np.float64)
+
+
+@njit(cache=True, error_model="numpy")
+def _kinematics(c, q1, s2, c2, s3, c3, qd1, qd2, qd3, qdd1, qdd2, qdd3):  # type: ignore[no-untyped-def]
+    """Platform position, velocity, acceleration and the rods; NaN outside the workspace.
+
+    [Almeida2010] eq. (1)-(2). The platform hangs: of the two meets of the circles that E and F allow, the larger x3.
+    """
+    a1l, a1r = c[2], c[3]
+    # arm tips relative to the spherical joints' mounting points, so that both rods end in x
+    cy, cz = -c[0] - a1l * c2, a1l * s2
+    dy, dz = c[1] + a1r * c3, a1r * s3
+    # two circles in the (x2, x3) plane
+    ey, ez = dy - cy, dz - cz
+    span = ey * ey + ez * ez
+    rod_l = c[4] - q1 * q1
+    rod_r = c[5] - q1 * q1
+    along = 0.5 * (rod_l - rod_r + span) / span
+    up = math.sqrt(rod_l / span - along * along)
+    if ey < 0.0:
+        up = -up
+    x2 = cy + along * ey - up * ez
+    x3 = cz + along * ez + up * ey
+    u2, u3 = x2 - cy, x3 - cz
+    w2, w3 = x2 - dy, x3 - dz
+    # arm tip velocity per q2, q3; its derivative is the centripetal direction
+    tcy, tcz = a1l * s2, a1l * c2
+    tdy, tdz = -a1r * s3, a1r * c3
+    jq2 = u2 * tcy + u3 * tcz
+    jq3 = w2 * tdy + w3 * tdz
+    det = u2 * w3 - u3 * w2
+    inv = 1.0 / det
+    r2 = jq2 * qd2 - q1 * qd1
+    r3 = jq3 * qd3 - q1 * qd1
+    xd2 = (w3 * r2 - u3 * r3) * inv
+    xd3 = (u2 * r3 - w2 * r2) * inv
+    # u.(xdd - Cdd) + |xd - Cd|^2 = 0, and the same for w
+    cdy, cdz = tcy * qd2, tcz * qd2
+    ddy, ddz = tdy * qd3, tdz * qd3
+    cddy = tcy * qdd2 + a1l * c2 * qd2 * qd2
+    cddz = tcz * qdd2 - a1l * s2 * qd2 * qd2
+    dddy = tdy * qdd3 - a1r * c3 * qd3 * qd3
+    dddz = tdz * qdd3 - a1r * s3 * qd3 * qd3
+    common = q1 * qdd1 + qd1 * qd1
+    r2 = u2 * cddy + u3 * cddz - common - (xd2 - cdy) ** 2 - (xd3 - cdz) ** 2
+    r3 = w2 * dddy + w3 * dddz - common - (xd2 - ddy) ** 2 - (xd3 - ddz) ** 2
+    xdd2 = (w3 * r2 - u3 * r3) * inv
+    xdd3 = (u2 * r3 - w2 * r2) * inv
+    return (
+        x2, x3, xd2, xd3, xdd2, xdd3, u2, u3, w2, w3, inv, jq2, jq3,
+        tcy, tcz, tdy, tdz, cddy, cddz, dddy, dddz,
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def torques_sample(c, q1, s2, c2, s3, c3, qd1, qd2, qd3, qdd1, qdd2, qdd3, f1, f2, f3):  # type: ignore[no-untyped-def]
+    """tau1, tau2, tau3 by virtual work; [Almeida2010] eq. (4)-(6) and (13)-(15) in end-point coordinates."""
+    (
+        x2, _x3, xd2, _xd3, xdd2, xdd3, u2, u3, w2, w3, inv, jq2, jq3,
+        tcy, tcz, tdy, tdz, cddy, cddz, dddy, dddz,
+    ) = _kinematics(c, q1, s2, c2, s3, c3, qd1, qd2, qd3, qdd1, qdd2, qdd3)  # fmt: skip
+    # forces that the moving parts need at C, D and at the platform
+    fcy = c[6] * cddy + c[7] * xdd2
+    fcz = c[6] * cddz + c[7] * xdd3 - c[9]
+    fdy = c[10] * dddy + c[11] * xdd2
+    fdz = c[10] * dddz + c[11] * xdd3 - c[13]
+    carried = c[8] + c[12] + c[14]
+    px = carried * qdd1 - f1
+    py = carried * xdd2 + c[7] * cddy + c[11] * dddy - f2
+    pz = carried * xdd3 + c[7] * cddz + c[11] * dddz - c[15] - f3
+    # C and D do not move along x1, but the rods' coupling terms act on the platform's x1 through E and F only
+    # the parallelogram: its tip is at (x2, sqrt(a5^2 - x2^2)); slope and its rate follow
+    inv_z = 1.0 / math.sqrt(c[17] - x2 * x2)
+    slope = -x2 * inv_z
+    zdd = slope * xdd2 - xd2 * xd2 * c[17] * inv_z * inv_z * inv_z
+    py += c[18] * (xdd2 + slope * zdd) - c[19] * slope
+    # J_x^T lambda = p: the rods' force densities, then tau = J_q^T lambda + what acts at the actuated joints directly
+    lam2 = (w3 * py - w2 * pz) * inv
+    lam3 = (u2 * pz - u3 * py) * inv
+    tau1 = px - q1 * (lam2 + lam3) + c[16] * qdd1
+    tau2 = jq2 * lam2 + fcy * tcy + fcz * tcz
+    tau3 = jq3 * lam3 + fdy * tdy + fdz * tdz
+    return tau1, tau2, tau3
+
+
+@njit(cache=True, error_model="numpy")
+def torques_batch(c, q, qd, qdd, force, tau):  # type: ignore[no-untyped-def]
+    """Fill tau ``(n, 3)``; samples outside the workspace become NaN."""
+    for i in range(q.shape[0]):
+        tau[i, 0], tau[i, 1], tau[i, 2] = torques_sample(
+            c, q[i, 0], math.sin(q[i, 1]), math.cos(q[i, 1]), math.sin(q[i, 2]), math.cos(q[i, 2]),
+            qd[i, 0], qd[i, 1], qd[i, 2], qdd[i, 0], qdd[i, 1], qdd[i, 2], force[i, 0], force[i, 1], force[i, 2],
+        )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def motion_batch(c, q, qd, qdd, x, xd, xdd, jacobian, determinants):  # type: ignore[no-untyped-def]
+    """Fill platform motion, J = J_x^-1 J_q ``(n, 3, 3)`` and (det J_x, J_q22, J_q33) ``(n, 3)``."""
+    for i in range(q.shape[0]):
+        (
+            x2, x3, xd2, xd3, xdd2, xdd3, u2, u3, w2, w3, inv, jq2, jq3,
+            _tcy, _tcz, _tdy, _tdz, _cddy, _cddz, _dddy, _dddz,
+        ) = _kinematics(
+            c, q[i, 0], math.sin(q[i, 1]), math.cos(q[i, 1]), math.sin(q[i, 2]), math.cos(q[i, 2]),
+            qd[i, 0], qd[i, 1], qd[i, 2], qdd[i, 0], qdd[i, 1], qdd[i, 2],
+        )  # fmt: skip
+        x[i, 0], x[i, 1], x[i, 2] = q[i, 0], x2, x3
+        xd[i, 0], xd[i, 1], xd[i, 2] = qd[i, 0], xd2, xd3
+        xdd[i, 0], xdd[i, 1], xdd[i, 2] = qdd[i, 0], xdd2, xdd3
+        jacobian[i, 0, 0], jacobian[i, 0, 1], jacobian[i, 0, 2] = 1.0, 0.0, 0.0
+        jacobian[i, 1, 0], jacobian[i, 2, 0] = q[i, 0] * (u3 - w3) * inv, q[i, 0] * (w2 - u2) * inv
+        jacobian[i, 1, 1], jacobian[i, 2, 1] = w3 * jq2 * inv, -w2 * jq2 * inv
+        jacobian[i, 1, 2], jacobian[i, 2, 2] = -u3 * jq3 * inv, u2 * jq3 * inv
+        determinants[i, 0], determinants[i, 1], determinants[i, 2] = u2 * w3 - u3 * w2, jq2, jq3

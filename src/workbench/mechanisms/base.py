@@ -1,0 +1,308 @@
+"""What every mechanism with a closed form is made of: parameters, their place in the MJCF, kinematics, candidates.
+
+Nothing here knows MuJoCo. A mechanism *describes* where its parameters live in an MJCF (`Target`); `workbench.mjcf`
+reads and writes them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from workbench.arrays import FloatArray, as_batches, as_force
+from workbench.errors import ParameterError, did_you_mean
+
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class ParameterInfo:
+    """One parameter as a user meets it: name, unit, meaning, source and the values it may have."""
+
+    name: str
+    unit: str
+    meaning: str
+    source: str = ""
+    sided: bool = False
+    """True: stored as ``name_left`` and ``name_right``; the bare name sets both."""
+    minimum: float = -math.inf
+    minimum_allowed: bool = True
+    """False: the minimum itself is refused (a length of zero)."""
+    maximum: float = math.inf
+
+
+@dataclass(frozen=True)
+class Target:
+    """One number in the MJCF: ``attribute[index]`` of an element is ``factor`` times the product of parameters.
+
+    Parameters
+    ----------
+    element
+        MJCF tag: ``body``, ``inertial`` (named by its body), ``site``, ``geom``, ``joint`` or ``option``.
+    name
+        The element's name; for ``inertial`` its body's; for ``option`` the empty string.
+    attribute, index
+        The attribute and the position of the number in it.
+    factor
+        Constant factor, a sign or a power of two, so that reading it back loses nothing.
+    of
+        The parameters whose product, times factor, is the number.
+    reads
+        The parameter that is read back from this number, by dividing the others out; None for targets that only follow
+        (visible geoms, the second bar of a parallelogram).
+    """
+
+    element: str
+    name: str
+    attribute: str
+    index: int
+    factor: float
+    of: tuple[str, ...]
+    reads: str | None = None
+
+
+@dataclass(frozen=True)
+class UniformRule:
+    """Changing a parameter in ``when`` sets those in ``sets``, unless they (or one in ``unless``) are given too.
+
+    This is the promise of DESIGN section 2: a bar whose mass or length changes stays a uniform slender bar.
+    """
+
+    when: tuple[str, ...]
+    sets: Mapping[str, Callable[[Mapping[str, float]], float]]
+    unless: tuple[str, ...] = ()
+
+
+CandidateFunction = Callable[["Mechanism", FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A closed form: ``(mechanism, q, qd, qdd, external_force) -> tau``, arrays ``(n, 3)``, SI, platform frame."""
+
+    name: str
+    mass_model: str
+    """the reference mass model whose assumption the formula shares"""
+    function: CandidateFunction
+    description: str
+    source: str = ""
+
+
+class Mechanism(ABC):
+    """A parallel robot with closed-form kinematics and inverse dynamics.
+
+    Subclasses state the class attributes and implement the abstract methods; arrays at the public surface are float64,
+    SI, batch first, in actuator order, in the paper's frame.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    reference_key: ClassVar[str]
+    """bibliography key, explained in docs/references.md"""
+    joints: ClassVar[tuple[str, ...]]
+    coordinate_units: ClassVar[tuple[str, ...]]
+    """unit of each q, ``m`` or ``rad``"""
+    force_units: ClassVar[tuple[str, ...]]
+    """unit of each tau, ``N`` or ``N m``"""
+    platform_axes: ClassVar[tuple[str, ...]]
+    """names of the platform coordinates as the paper writes them"""
+    mass_models: ClassVar[tuple[str, ...]] = ("distributed", "lumped")
+    parameter_table: ClassVar[tuple[ParameterInfo, ...]]
+    targets: ClassVar[tuple[Target, ...]]
+    uniform_rules: ClassVar[tuple[UniformRule, ...]] = ()
+    candidates: ClassVar[Mapping[str, Candidate]]
+    parameter_type: ClassVar[type]
+
+    def __init__(self, parameters: Any) -> None:
+        """Build from an instance of `parameter_type`.
+
+        Raises
+        ------
+        ParameterError
+            A value is not finite or outside the range that the parameter table allows.
+        """
+        self._parameters = parameters
+        check_parameters(self.parameter_table, dataclasses.asdict(parameters))
+
+    @property
+    def parameters(self) -> Any:
+        """The frozen dataclass of parameters, SI."""
+        return self._parameters
+
+    def with_parameters(self, **changes: float) -> Self:
+        """Return a new mechanism with some parameters changed.
+
+        Parameters
+        ----------
+        **changes
+            New values by name, SI. ``NAME`` sets both limbs, ``NAME_left`` or ``NAME_right`` one. Changing a bar's mass
+            or length keeps it a uniform slender bar unless its inertia is given too.
+
+        Raises
+        ------
+        ParameterError
+            Unknown name, or a value that the parameter may not have.
+        """
+        values = changed_parameters(type(self), dataclasses.asdict(self._parameters), changes)
+        return type(self)(self.parameter_type(**values))
+
+    @abstractmethod
+    def forward_kinematics(self, q: ArrayLike) -> FloatArray:
+        """Platform position ``(n, 3)`` in metres from actuated coordinates ``(n, 3)``, on the home branch."""
+
+    @abstractmethod
+    def inverse_kinematics(self, x: ArrayLike) -> FloatArray:
+        """Actuated coordinates ``(n, 3)`` from platform positions ``(n, 3)`` in metres, on the home branch."""
+
+    @abstractmethod
+    def jacobian(self, q: ArrayLike) -> FloatArray:
+        """J of shape ``(n, 3, 3)`` with xd = J qd."""
+
+    @abstractmethod
+    def platform_motion(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Position, velocity and acceleration of the platform, each ``(n, 3)``."""
+
+    @abstractmethod
+    def joint_motion(self, x: ArrayLike, xd: ArrayLike, xdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Actuated position, velocity and acceleration, each ``(n, 3)``, from a platform motion."""
+
+    @abstractmethod
+    def singularity_measures(self, q: ArrayLike) -> dict[str, FloatArray]:
+        """Determinants that vanish at singular poses, name -> ``(n,)``, scaled to be dimensionless (1 is far away)."""
+
+    @abstractmethod
+    def torques(
+        self, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, external_force: FloatArray
+    ) -> FloatArray:
+        """Inverse dynamics on checked arrays; called by `inverse_dynamics`."""
+
+    def inverse_dynamics(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        mass_model: str = "distributed",
+        external_force: ArrayLike | None = None,
+    ) -> FloatArray:
+        """Actuator forces and torques that produce a motion.
+
+        Parameters
+        ----------
+        q, qd, qdd
+            Actuated position, velocity, acceleration, each ``(n, 3)``, SI.
+        mass_model
+            One of `mass_models`: bars with their rotational inertia, or without.
+        external_force
+            Newtons, paper frame, acting on the platform: ``(3,)`` or ``(n, 3)``; None is no force.
+
+        Returns
+        -------
+        numpy.ndarray
+            tau ``(n, 3)``, what the actuators must supply, in `force_units`.
+
+        Raises
+        ------
+        ArrayError
+            Wrong shapes or entries that are not finite.
+        ParameterError
+            Unknown mass model.
+        MotionError
+            A sample outside the workspace or at a singular pose; the message names sample and joint.
+        """
+        if mass_model not in self.mass_models:
+            raise ParameterError(f'unknown mass model "{mass_model}"{did_you_mean(mass_model, self.mass_models)}')
+        arrays = as_batches(q=q, qd=qd, qdd=qdd)
+        return self.torques(*arrays, mass_model, as_force("external_force", external_force, len(arrays[0])))
+
+
+def stored_names(table: tuple[ParameterInfo, ...]) -> dict[str, ParameterInfo]:
+    """Map each stored field name (``a2_left`` ...) to its description."""
+    names: dict[str, ParameterInfo] = {}
+    for info in table:
+        for name in [f"{info.name}_{side}" for side in SIDES] if info.sided else [info.name]:
+            names[name] = info
+    return names
+
+
+def expand_names(table: tuple[ParameterInfo, ...], changes: Mapping[str, float]) -> dict[str, float]:
+    """Resolve ``NAME`` to ``NAME_left`` and ``NAME_right`` where the parameter is sided; one-sided names win.
+
+    Raises
+    ------
+    ParameterError
+        Unknown name (with the nearest valid one), or a value that is not a real number.
+    """
+    stored = stored_names(table)
+    sided = {info.name for info in table if info.sided}
+    result: dict[str, float] = {}
+    for name in sorted(changes, key=lambda n: n in stored):
+        if isinstance(changes[name], bool) or not isinstance(changes[name], int | float | np.floating | np.integer):
+            raise ParameterError(f"parameter {name}: {changes[name]!r} is not a number", parameter=name)
+        value = float(changes[name])
+        if name in stored:
+            result[name] = value
+        elif name in sided:
+            result |= {f"{name}_{side}": value for side in SIDES}
+        else:
+            raise ParameterError(f'unknown parameter "{name}"{did_you_mean(name, {*stored, *sided})}', parameter=name)
+    return result
+
+
+def check_parameters(table: tuple[ParameterInfo, ...], values: Mapping[str, float]) -> None:
+    """Refuse values that are not finite or outside the table's range.
+
+    Raises
+    ------
+    ParameterError
+        Naming the parameter, its value, its unit and what is allowed.
+    """
+    for name, info in stored_names(table).items():
+        value = values[name]
+        low = value < info.minimum or (value == info.minimum and not info.minimum_allowed)
+        if not math.isfinite(value) or low or value > info.maximum:
+            bounds = []
+            if info.minimum > -math.inf:
+                bounds.append(f"{'>=' if info.minimum_allowed else '>'} {info.minimum:g}")
+            if info.maximum < math.inf:
+                bounds.append(f"<= {info.maximum:g}")
+            allowed = " and ".join(bounds) or "a finite number"
+            unit = f" {info.unit}" if info.unit not in ("", "1") else ""
+            raise ParameterError(
+                f"parameter {name} = {value:g}{unit}; allowed: {allowed} ({info.meaning})",
+                parameter=name,
+                value=value,
+            )
+
+
+def changed_parameters(
+    mechanism: type[Mechanism], values: Mapping[str, float], changes: Mapping[str, float]
+) -> dict[str, float]:
+    """Apply *changes* to *values* with the uniform-bar rules, and check the result.
+
+    Raises
+    ------
+    ParameterError
+        Unknown name, or a value out of range.
+    """
+    given = expand_names(mechanism.parameter_table, changes)
+    check_known = {**values, **given}
+    check_parameters(mechanism.parameter_table, check_known)
+    result = dict(check_known)
+    for rule in mechanism.uniform_rules:
+        moved = any(name in given and given[name] != values[name] for name in rule.when)
+        if not moved or any(name in given for name in rule.unless):
+            continue
+        for name, value in rule.sets.items():
+            if name not in given:
+                result[name] = value(result)
+    check_parameters(mechanism.parameter_table, result)
+    return result

@@ -1,0 +1,5 @@
+"""The only place that calls the engine: loop closure and constraint-projected inverse dynamics of an MJCF."""
+
+from workbench.reference.mujoco_reference import Mobility, MujocoReference, ReferenceResult
+
+__all__ = ["Mobility", "MujocoReference", "ReferenceResult"]

@@ -1,0 +1,124 @@
+"""Rank-revealing least squares for many small systems: Householder QR with column pivoting, compiled.
+
+The loop-closure Jacobian of a parallel mechanism is rank-deficient by nature (redundant rows), so normal equations and
+Cholesky factors of J J^T are out of the question. Its passive columns, however, are independent away from singular
+poses; with A P = Q R the same factor serves positions, velocities, accelerations and the least-norm multipliers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+RANK_TOLERANCE = 1e-10
+"""A column counts as dependent when its pivot is below this fraction of the largest one."""
+
+
+@njit(cache=True, error_model="numpy")
+def factor(a, beta, perm):  # type: ignore[no-untyped-def]
+    """Factor ``a (m, p)`` in place; returns the rank. Reflectors below the diagonal, R on and above it.
+
+    ``beta (p,)`` receives the reflector scales, ``perm (p,)`` the column order.
+    """
+    m, p = a.shape
+    steps = min(m, p)
+    for j in range(p):
+        perm[j] = j
+    rank = 0
+    first = 0.0
+    for k in range(steps):
+        best, pivot = -1.0, k
+        for j in range(k, p):
+            s = 0.0
+            for i in range(k, m):
+                s += a[i, j] * a[i, j]
+            if s > best:
+                best, pivot = s, j
+        if pivot != k:
+            for i in range(m):
+                a[i, k], a[i, pivot] = a[i, pivot], a[i, k]
+            perm[k], perm[pivot] = perm[pivot], perm[k]
+        norm = math.sqrt(best)
+        if k == 0:
+            first = norm
+        if not norm > RANK_TOLERANCE * first:
+            for j in range(k, p):
+                beta[j] = 0.0
+            return rank
+        rank += 1
+        head = a[k, k]
+        alpha = -norm if head > 0.0 else norm
+        # reflector v = (1, a[k+1:]/(head - alpha)), H = 1 - beta v v^T
+        scale = 1.0 / (head - alpha)
+        beta[k] = (alpha - head) / alpha
+        a[k, k] = alpha
+        for i in range(k + 1, m):
+            a[i, k] *= scale
+        for j in range(k + 1, p):
+            s = a[k, j]
+            for i in range(k + 1, m):
+                s += a[i, k] * a[i, j]
+            s *= beta[k]
+            a[k, j] -= s
+            for i in range(k + 1, m):
+                a[i, j] -= s * a[i, k]
+    for j in range(steps, p):
+        beta[j] = 0.0
+    return rank
+
+
+@njit(cache=True, error_model="numpy")
+def solve(a, beta, perm, rank, rhs, x):  # type: ignore[no-untyped-def]
+    """Least squares ``min |A x - rhs|``; returns the residual norm. ``rhs (m,)`` is overwritten by Q^T rhs."""
+    m, p = a.shape
+    for k in range(rank):
+        s = rhs[k]
+        for i in range(k + 1, m):
+            s += a[i, k] * rhs[i]
+        s *= beta[k]
+        rhs[k] -= s
+        for i in range(k + 1, m):
+            rhs[i] -= s * a[i, k]
+    for j in range(p):
+        x[j] = 0.0
+    for k in range(rank - 1, -1, -1):
+        s = rhs[k]
+        for j in range(k + 1, rank):
+            s -= a[k, j] * x[perm[j]]
+        x[perm[k]] = s / a[k, k]
+    residual = 0.0
+    for i in range(rank, m):
+        residual += rhs[i] * rhs[i]
+    return math.sqrt(residual)
+
+
+@njit(cache=True, error_model="numpy")
+def solve_transposed(a, beta, perm, rank, rhs, y):  # type: ignore[no-untyped-def]
+    """Least-norm ``y (m,)`` with A^T y = rhs ``(p,)``."""
+    m = a.shape[0]
+    for i in range(m):
+        y[i] = 0.0
+    for k in range(rank):
+        s = rhs[perm[k]]
+        for i in range(k):
+            s -= a[i, k] * y[i]
+        y[k] = s / a[k, k]
+    for k in range(rank - 1, -1, -1):
+        s = y[k]
+        for i in range(k + 1, m):
+            s += a[i, k] * y[i]
+        s *= beta[k]
+        y[k] -= s
+        for i in range(k + 1, m):
+            y[i] -= s * a[i, k]
+
+
+def least_squares(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, int, float]:
+    """Solve one system with the compiled routines: solution, rank and residual norm (for tests and set-up)."""
+    a = np.array(matrix, dtype=np.float64, order="C")
+    beta, perm, x = np.zeros(a.shape[1]), np.zeros(a.shape[1], dtype=np.int64), np.zeros(a.shape[1])
+    rank = factor(a, beta, perm)
+    residual = solve(a, beta, perm, rank, np.array(rhs, dtype=np.float64), x)
+    return x, int(rank), float(residual)

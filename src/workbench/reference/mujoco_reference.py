@@ -1,0 +1,272 @@
+"""The reference: closed-chain inverse dynamics by MuJoCo, with the constraint forces projected out.
+
+`mj_inverse` alone is wrong for closed chains, since its equality constraints are soft; see docs/reference.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from workbench.arrays import FloatArray, as_batches, as_force
+from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
+from workbench.mjcf import custom_text, load_model
+from workbench.reference.closure import Assembly, LoopCloser
+from workbench.reference.engine import Engine, mass_layout, without_bar_inertia
+from workbench.reference.kernels import projection, velocities
+from workbench.reference.reactions import joint_reactions
+from workbench.reference.structure import read_structure
+
+MASS_MODELS = ("distributed", "lumped")
+
+INCONSISTENT = 1e-9
+"""A velocity residual above this fraction of the fastest constraint velocity means that the actuated motion cannot be
+followed: the pose is singular or the mechanism is actuated redundantly and inconsistently."""
+
+
+@dataclass(frozen=True)
+class ReferenceResult:
+    """Inverse dynamics of n samples; arrays float64, SI, platform quantities in the paper's (base body's) frame."""
+
+    tau: FloatArray
+    """``(n, na)`` actuator forces (N) and torques (N m)"""
+    x: FloatArray
+    """``(n, 3)`` platform position, m"""
+    xd: FloatArray
+    xdd: FloatArray
+    reactions: dict[str, FloatArray]
+    """force ``(n, 3)`` in N, base frame, that the parent exerts on the child body at each joint, and that the second
+    site's body exerts on the first's at each loop closure"""
+    closure_residual: FloatArray
+    """``(n,)`` largest open loop coordinate, m (rad for turns)"""
+    velocity_residual: FloatArray
+    acceleration_residual: FloatArray
+    rank: np.ndarray
+    """``(n,)`` rank of the loop constraints on the passive freedoms"""
+    condition: FloatArray
+    """``(n,)`` estimate of the condition number of the passive loop Jacobian, from the pivots of its QR factor"""
+    energy: FloatArray
+    """``(n, 2)`` potential and kinetic energy, J"""
+    qpos: FloatArray
+    qvel: FloatArray
+    qacc: FloatArray
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Freedoms counted from the constraint Jacobian at the home pose."""
+
+    mobility: int
+    """freedoms left for the actuators: joint freedoms less rank less idle freedoms"""
+    joint_freedoms: int
+    constraint_rows: int
+    rank: int
+    redundant_rows: int
+    idle_freedoms: int
+    """spins of rods between two spherical joints about their own axes"""
+
+
+class MujocoReference:
+    """Closed-chain inverse dynamics of an MJCF model.
+
+    Parameters
+    ----------
+    path
+        MJCF file; ``<custom>`` names ``base_body``, ``platform_site`` and ``lumped_bodies``.
+    threads
+        Threads for MuJoCo's own work; results are the same, bit for bit, for any number.
+    **parameters
+        Overrides by name, SI, as for `workbench.load_mechanism`.
+
+    Raises
+    ------
+    ModelError
+        The file does not compile, its loops cannot be closed, or it holds something that is not covered.
+    ParameterError
+        Unknown parameter or a value it may not have.
+    """
+
+    def __init__(self, path: str | Path, *, threads: int = 1, **parameters: float) -> None:
+        loaded = load_model(path, parameters)
+        self.file = loaded.file
+        self._text = loaded.text
+        self._threads = threads
+        self._structure = read_structure(loaded.model, loaded.file)
+        self._engines = {"distributed": Engine(loaded.model, threads)}
+        self._mass_layout = mass_layout(loaded.model)
+        self._closer = LoopCloser(self._engines["distributed"], self._structure)
+        self._closed: tuple[FloatArray, Assembly] | None = None
+        self._base_rotation = np.eye(3)
+        self._locate_base()
+        self._check_freedoms()
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Actuated joints, in actuator order."""
+        return self._structure.joint_names
+
+    def mobility(self) -> Mobility:
+        """Count freedoms and redundant rows by rank at the home pose."""
+        structure = self._structure
+        jacobian = self._home_jacobian()
+        loops = jacobian[: structure.loop_rows]
+        rank = int(np.linalg.matrix_rank(loops, tol=1e-9)) if len(loops) else 0
+        freedoms = jacobian.shape[1]
+        idle = len(structure.idle)
+        return Mobility(freedoms - rank - idle, freedoms, structure.loop_rows, rank, structure.loop_rows - rank, idle)
+
+    def inverse_dynamics(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        mass_model: str = "distributed",
+        external_force: ArrayLike | None = None,
+    ) -> ReferenceResult:
+        """Actuator forces that produce a motion, with everything needed to judge them.
+
+        Parameters
+        ----------
+        q, qd, qdd
+            Actuated position, velocity, acceleration, each ``(n, na)``, SI; samples need not form a trajectory.
+        mass_model
+            ``"distributed"``, the model as it is, or ``"lumped"``, bars without rotational inertia.
+        external_force
+            Newtons, base (paper) frame, acting on the platform site: ``(3,)`` or ``(n, 3)``.
+
+        Raises
+        ------
+        MotionError
+            A sample that cannot be closed on the home branch, or a singular pose; the message names sample and joint.
+        ArrayError
+            Wrong shapes or entries that are not finite.
+        ParameterError
+            Unknown mass model.
+        """
+        structure = self._structure
+        q, qd, qdd = as_batches(len(structure.actuated), q=q, qd=qd, qdd=qdd)
+        n = len(q)
+        force = as_force("external_force", external_force, n) @ self._base_rotation.T
+        engine = self._engine(mass_model)
+        nv = engine.model.nv
+        assembly = self._assemble(q)
+        qpos = assembly.qpos
+        poses = engine.poses(qpos)
+        tables = (
+            poses.cdof, poses.com, structure.moves, structure.root, structure.blocks, structure.block_rows,
+            structure.polynomials, poses.site_xpos, poses.site_xquat, poses.anchors, qpos, self._closer.joints,
+            structure.passive, structure.actuated,
+        )  # fmt: skip
+        qvel, velocity_residual = np.zeros((n, nv)), np.zeros(n)
+        rank, condition, weakest = np.zeros(n, dtype=np.int64), np.zeros(n), np.zeros(n, dtype=np.int64)
+        velocities(*tables, qd, qvel, velocity_residual, rank, condition, weakest)
+        self._refuse_singular(q, qd, rank, velocity_residual, weakest)
+        dynamics = engine.dynamics(qpos, qvel)
+        tau, qacc = np.zeros_like(q), np.zeros((n, nv))
+        multipliers, acceleration_residual = np.zeros((n, structure.rows)), np.zeros(n)
+        site = structure.platform_site
+        body = int(engine.model.site_bodyid[site])
+        point = np.ascontiguousarray(poses.site_xpos[:, site])
+        projection(
+            tables[0], dynamics.cdof_dot, *tables[1:], qvel, qdd, dynamics.mass, *self._mass_layout, dynamics.bias,
+            body, point, force, qacc, tau, multipliers, acceleration_residual,
+        )  # fmt: skip
+        x, xd, xdd, reactions = joint_reactions(
+            engine.model, structure, poses, dynamics, qvel, qacc, multipliers, force, self._base_rotation,
+            self._base_position,
+        )  # fmt: skip
+        return ReferenceResult(
+            tau=tau, x=x, xd=xd, xdd=xdd, reactions=reactions, closure_residual=assembly.residual,
+            velocity_residual=velocity_residual, acceleration_residual=acceleration_residual, rank=rank,
+            condition=condition, energy=dynamics.energy, qpos=qpos, qvel=qvel, qacc=qacc,
+        )  # fmt: skip
+
+    def _engine(self, mass_model: str) -> Engine:
+        if mass_model not in MASS_MODELS:
+            raise ParameterError(f'unknown mass model "{mass_model}"{did_you_mean(mass_model, MASS_MODELS)}')
+        if mass_model not in self._engines:
+            names = custom_text(self._engines["distributed"].model, "lumped_bodies")
+            if names is None:
+                raise ModelError(
+                    f'{self.file}: <custom> has no <text name="lumped_bodies">; the lumped model needs the names of the'
+                    " bars that lose their rotational inertia",
+                    file=self.file,
+                )
+            known = [self._engines["distributed"].model.body(i).name for i in range(1, self._nbody)]
+            for name in names.split():
+                if name not in known:
+                    raise ModelError(
+                        f'{self.file}: <text name="lumped_bodies"> names body "{name}"{did_you_mean(name, known)}',
+                        file=self.file,
+                    )
+            self._engines[mass_model] = Engine(without_bar_inertia(self._text, tuple(names.split())), self._threads)
+        return self._engines[mass_model]
+
+    @property
+    def _nbody(self) -> int:
+        return int(self._engines["distributed"].model.nbody)
+
+    def _assemble(self, q: FloatArray) -> Assembly:
+        if self._closed is None or not np.array_equal(self._closed[0], q):
+            self._closed = (q.copy(), self._closer.close(q))
+        return self._closed[1]
+
+    def _locate_base(self) -> None:
+        import mujoco  # noqa: PLC0415
+
+        model = self._engines["distributed"].model
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        if self._structure.moves[self._structure.base].any():
+            raise ModelError(f'{self.file}: the base body moves; <text name="base_body"> must name a fixed one')
+        self._base_rotation = data.xmat[self._structure.base].reshape(3, 3).copy()
+        self._base_position = data.xpos[self._structure.base].copy()
+
+    def _home_jacobian(self) -> FloatArray:
+        from workbench.reference.kernels import rows_sample  # noqa: PLC0415
+
+        structure, joints = self._structure, self._closer.joints
+        home = self._closer.home[None, :]
+        poses = self._engines["distributed"].poses(home)
+        jacobian, residual = np.zeros((structure.rows, poses.cdof.shape[1])), np.zeros(structure.rows)
+        rows_sample(
+            poses.cdof[0], poses.com[0], structure.moves, structure.root, structure.blocks, structure.block_rows,
+            structure.polynomials, poses.site_xpos[0], poses.site_xquat[0], poses.anchors[0], home[0][joints[1]],
+            joints[2], jacobian, residual,
+        )  # fmt: skip
+        return jacobian
+
+    def _check_freedoms(self) -> None:
+        """Every passive freedom must follow from the actuated ones."""
+        passive = self._home_jacobian()[:, self._structure.passive]
+        values, vectors = np.linalg.svd(passive)[1:]
+        loose = passive.shape[1] - int(np.count_nonzero(values > 1e-9 * max(values, default=1.0)))
+        if loose:
+            direction = np.abs(vectors[-1])
+            joint = self._structure.dof_names[self._structure.passive[int(np.argmax(direction))]]
+            raise ModelError(
+                f'{self.file}: {loose} freedom(s) that no actuator holds, most of it in joint "{joint}"; add an actuator'
+                " or a constraint",
+                file=self.file,
+                joint=joint,
+            )
+
+    def _refuse_singular(
+        self, q: FloatArray, qd: FloatArray, rank: np.ndarray, residual: FloatArray, weakest: np.ndarray
+    ) -> None:
+        structure = self._structure
+        speed = np.maximum(np.abs(qd).max(axis=1), 1.0)
+        bad = (rank < len(structure.passive)) | ~(residual <= INCONSISTENT * speed)
+        if bad.any():
+            sample = int(np.argmax(bad))
+            joint = structure.dof_names[int(weakest[sample])]
+            shown = ", ".join(f"{n} = {v:.6g}" for n, v in zip(structure.joint_names, q[sample], strict=True))
+            raise MotionError(
+                f"sample {sample}, joint {joint}: singular pose at {shown}; the actuators do not determine the motion",
+                sample=sample,
+                joint=joint,
+                value=q[sample].tolist(),
+            )

@@ -1,0 +1,208 @@
+"""What the reference has to know of a compiled MJCF: actuated and passive freedoms, loop closures, idle spins.
+
+Names are resolved here, once; whatever the projection does not cover is refused here, in one line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from workbench.arrays import FloatArray
+from workbench.errors import ModelError
+from workbench.mjcf import custom_text
+
+IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+
+CONNECT, WELD, JOINT, SPIN = 0, 1, 2, 3
+"""Kinds of constraint blocks; SPIN says that a rod between two spherical joints does not turn about its own axis."""
+
+ROWS = {CONNECT: 3, WELD: 6, JOINT: 1, SPIN: 1}
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Integer tables of one model; ``blocks`` is ``(k, 5)``: kind, body 1, body 2, site 1, site 2 (joint ids for JOINT)."""
+
+    file: str
+    actuated: IntArray
+    """velocity addresses of the actuated joints, in actuator order"""
+    actuated_qpos: IntArray
+    passive: IntArray
+    joint_names: tuple[str, ...]
+    dof_names: tuple[str, ...]
+    blocks: IntArray
+    block_names: tuple[str, ...]
+    block_rows: IntArray
+    polynomials: FloatArray
+    """``(k, 5)`` coefficients of joint equalities"""
+    moves: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    """``(nbody, nv)``: does the velocity move the body"""
+    root: IntArray
+    base: int
+    platform_site: int
+    idle: tuple[str, ...]
+    """bodies whose spin about their own axis is idle"""
+    home_qpos: FloatArray
+    columns: IntArray = field(repr=False)
+    """for each velocity its place among the passive ones, or -1"""
+
+    @property
+    def rows(self) -> int:
+        """Number of constraint rows, spin rows included."""
+        return int(self.block_rows[-1])
+
+    @property
+    def loop_rows(self) -> int:
+        """Number of rows of the loop closures alone."""
+        return self.rows - len(self.idle)
+
+
+def _name(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
+    return mujoco.mj_id2name(model, kind, index) or f"#{index}"
+
+
+def read_structure(model: mujoco.MjModel, file: str) -> Structure:
+    """Resolve the tables of *model*.
+
+    Raises
+    ------
+    ModelError
+        Something the projection does not cover (contacts, tendons, limits, closures by body and anchor ...), with the
+        element's name and what would be accepted.
+    """
+    _refuse_uncovered(model, file)
+    obj = mujoco.mjtObj
+    joints = [int(model.actuator_trnid[a, 0]) for a in range(model.nu)]
+    if not joints:
+        raise ModelError(f"{file}: no actuator; the actuated joints are those that a motor drives", file=file)
+    actuated = np.array([model.jnt_dofadr[j] for j in joints], dtype=np.int64)
+    moves = np.zeros((model.nbody, model.nv), dtype=np.bool_)
+    for body in range(1, model.nbody):
+        moves[body] = moves[model.body_parentid[body]]
+        first = model.body_dofadr[body]
+        if first >= 0:
+            moves[body, first : first + model.body_dofnum[body]] = True
+    blocks, names, polynomials = _closures(model, file)
+    idle = _idle_rods(model, blocks)
+    for body, site in idle:
+        blocks.append((SPIN, body, 0, site, int(model.body_jntadr[body])))
+        names.append(f"spin of {_name(model, obj.mjOBJ_BODY, body)}")
+        polynomials.append(np.zeros(5))
+    passive = np.array([d for d in range(model.nv) if d not in set(actuated.tolist())], dtype=np.int64)
+    columns = np.full(model.nv, -1, dtype=np.int64)
+    columns[passive] = np.arange(len(passive))
+    home = mujoco.mj_name2id(model, obj.mjOBJ_KEY, "home")
+    return Structure(
+        file=file,
+        actuated=actuated,
+        actuated_qpos=np.array([model.jnt_qposadr[j] for j in joints], dtype=np.int64),
+        passive=passive,
+        joint_names=tuple(_name(model, obj.mjOBJ_JOINT, j) for j in joints),
+        dof_names=tuple(_name(model, obj.mjOBJ_JOINT, model.dof_jntid[d]) for d in range(model.nv)),
+        blocks=np.array(blocks, dtype=np.int64).reshape(-1, 5),
+        block_names=tuple(names),
+        block_rows=np.concatenate([[0], np.cumsum([ROWS[b[0]] for b in blocks])]).astype(np.int64),
+        polynomials=np.array(polynomials, dtype=np.float64).reshape(-1, 5),
+        moves=moves,
+        root=np.array(model.body_rootid, dtype=np.int64),
+        base=_named(model, obj.mjOBJ_BODY, "base_body", "body", file),
+        platform_site=_named(model, obj.mjOBJ_SITE, "platform_site", "site", file),
+        idle=tuple(_name(model, obj.mjOBJ_BODY, body) for body, _ in idle),
+        home_qpos=np.array(model.key_qpos[home] if home >= 0 else model.qpos0, dtype=np.float64),
+        columns=columns,
+    )
+
+
+def _named(model: mujoco.MjModel, kind: mujoco.mjtObj, key: str, element: str, file: str) -> int:
+    name = custom_text(model, key)
+    if name is None:
+        raise ModelError(f'{file}: <custom> has no <text name="{key}">; it names the {element}', file=file, key=key)
+    index = int(mujoco.mj_name2id(model, kind, name))
+    if index < 0:
+        raise ModelError(f'{file}: <text name="{key}"> names {element} "{name}", which does not exist', file=file)
+    return index
+
+
+def _closures(
+    model: mujoco.MjModel, file: str
+) -> tuple[list[tuple[int, int, int, int, int]], list[str], list[FloatArray]]:
+    blocks: list[tuple[int, int, int, int, int]] = []
+    names: list[str] = []
+    polynomials: list[FloatArray] = []
+    kinds = {mujoco.mjtEq.mjEQ_CONNECT: CONNECT, mujoco.mjtEq.mjEQ_WELD: WELD, mujoco.mjtEq.mjEQ_JOINT: JOINT}
+    for eq in range(model.neq):
+        if not model.eq_active0[eq]:
+            continue
+        name = _name(model, mujoco.mjtObj.mjOBJ_EQUALITY, eq)
+        kind = kinds.get(mujoco.mjtEq(model.eq_type[eq]))
+        if kind is None:
+            raise ModelError(f'{file}: equality "{name}" is neither connect, weld nor joint', file=file, element=name)
+        one, two = int(model.eq_obj1id[eq]), int(model.eq_obj2id[eq])
+        if kind == JOINT:
+            blocks.append((JOINT, 0, 0, one, two))
+            polynomials.append(np.array(model.eq_data[eq, :5], dtype=np.float64))
+        else:
+            if mujoco.mjtObj(model.eq_objtype[eq]) != mujoco.mjtObj.mjOBJ_SITE:
+                raise ModelError(
+                    f'{file}: equality "{name}" closes a loop by bodies; give site1 and site2, which stay right when a'
+                    " length is edited",
+                    file=file,
+                    element=name,
+                )
+            blocks.append((kind, int(model.site_bodyid[one]), int(model.site_bodyid[two]), one, two))
+            polynomials.append(np.zeros(5))
+        names.append(name)
+    return blocks, names, polynomials
+
+
+def _idle_rods(model: mujoco.MjModel, blocks: list[tuple[int, int, int, int, int]]) -> list[tuple[int, int]]:
+    """Bodies that hang on a ball joint and are closed by one connect: their spin about the line between is idle."""
+    rods: list[tuple[int, int]] = []
+    for body in range(1, model.nbody):
+        first = model.body_jntadr[body]
+        alone = model.body_jntnum[body] == 1 and not np.any(model.body_parentid[1:] == body)
+        if not alone or mujoco.mjtJoint(model.jnt_type[first]) != mujoco.mjtJoint.mjJNT_BALL:
+            continue
+        touching = [(b[0], b[3] if b[1] == body else b[4]) for b in blocks if body in (b[1], b[2])]
+        if len(touching) == 1 and touching[0][0] == CONNECT:
+            rods.append((body, touching[0][1]))
+    return rods
+
+
+def _refuse_uncovered(model: mujoco.MjModel, file: str) -> None:
+    """Refuse what the closed-chain inverse dynamics leaves out, so that no error is ever silent."""
+    obj = mujoco.mjtObj
+    if model.ntendon:
+        raise ModelError(f"{file}: {model.ntendon} tendon(s); none is covered", file=file)
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY.value:
+        raise ModelError(f"{file}: <flag gravity> is disabled; set gravity to zero by the parameter g", file=file)
+    contacts_off = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT.value)
+    if not contacts_off and np.any(model.geom_contype | model.geom_conaffinity):
+        geom = int(np.argmax(model.geom_contype | model.geom_conaffinity))
+        raise ModelError(
+            f'{file}: geom "{_name(model, obj.mjOBJ_GEOM, geom)}" can collide; contacts are not covered, disable them'
+            ' by <flag contact="disable"/>',
+            file=file,
+        )
+    for joint in range(model.njnt):
+        name = _name(model, obj.mjOBJ_JOINT, joint)
+        if mujoco.mjtJoint(model.jnt_type[joint]) == mujoco.mjtJoint.mjJNT_FREE:
+            raise ModelError(f'{file}: joint "{name}" is free; hang the mechanism on one fixed base body', file=file)
+        if model.jnt_limited[joint]:
+            raise ModelError(
+                f'{file}: joint "{name}" has a range {model.jnt_range[joint].tolist()}; limits are not covered',
+                file=file,
+            )
+        if model.jnt_stiffness[joint]:
+            value = float(model.jnt_stiffness[joint])
+            raise ModelError(f'{file}: joint "{name}" has stiffness {value:g}; springs are not covered', file=file)
+    for actuator in range(model.nu):
+        name = _name(model, obj.mjOBJ_ACTUATOR, actuator)
+        if mujoco.mjtTrn(model.actuator_trntype[actuator]) != mujoco.mjtTrn.mjTRN_JOINT:
+            raise ModelError(f'{file}: actuator "{name}" does not drive a joint', file=file)
+        kind = mujoco.mjtJoint(model.jnt_type[model.actuator_trnid[actuator, 0]])
+        if kind not in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
+            raise ModelError(f'{file}: actuator "{name}" must drive a hinge or slide joint', file=file)
