@@ -1,0 +1,7 @@
+"""Reports of a campaign run: read the stored results, draw and write them; recompute nothing."""
+
+from __future__ import annotations
+
+from workbench.report.build import build_report
+
+__all__ = ["build_report"]

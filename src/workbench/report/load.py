@@ -1,0 +1,211 @@
+"""Read a run directory: manifest.json, summary.csv and, case by case, series/<case>.parquet."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pyarrow
+import pyarrow.parquet
+from pydantic import ValidationError
+
+from workbench.arrays import FloatArray
+from workbench.errors import OutputError
+from workbench.report.manifest import FORMAT_VERSION, Manifest
+
+Series = Mapping[str, FloatArray]
+"""Column name -> values, shape ``(n,)``, SI."""
+
+
+@dataclass(frozen=True)
+class ErrorRow:
+    """One row of summary.csv: one case, candidate, reference and joint. Errors are fractions."""
+
+    case: str
+    candidate: str
+    reference: str
+    joint: str
+    peak_error: float
+    rms_error: float
+    pointwise_error: float
+    worst_time_s: float
+    bound: float | None
+    verdict: str
+    kind: str
+    peak_reference: float
+    unit: str
+    pointwise_skipped: int
+
+    @property
+    def is_verification(self) -> bool:
+        """True for a formula against the reference with the same mass model."""
+        return self.kind == "verification"
+
+    @property
+    def badness(self) -> float:
+        """Sort key: how large the error is, in bounds where there is a bound; NaN counts as worst."""
+        value = self.peak_error / self.bound if self.bound else self.peak_error
+        return math.inf if math.isnan(value) else value
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run directory, read and checked."""
+
+    directory: Path
+    manifest: Manifest
+    rows: tuple[ErrorRow, ...]
+
+    @cached_property
+    def rows_of_case(self) -> dict[str, list[ErrorRow]]:
+        """The rows by case, in file order; every case of the manifest is a key."""
+        grouped: dict[str, list[ErrorRow]] = {name: [] for name in self.manifest.cases}
+        for row in self.rows:
+            grouped[row.case].append(row)
+        return grouped
+
+    def series(self, case: str) -> Series:
+        """Read the time series of one case.
+
+        Raises
+        ------
+        OutputError
+            The file is missing, unreadable, or lacks a column that every series has.
+        """
+        folder = self.directory / "series"
+        path = folder / f"{case}.parquet"
+        if path.parent != folder or case in ("", ".", ".."):
+            raise OutputError(f"{self.directory}: case {case!r} cannot be a file name; allowed: one path component")
+        try:
+            table = pyarrow.parquet.read_table(io.BytesIO(path.read_bytes()))
+            columns = {name: np.asarray(table.column(name), dtype=np.float64) for name in table.column_names}
+        except FileNotFoundError as error:
+            raise OutputError(f"{path}: missing, though manifest.json lists case {case!r} as computed") from error
+        except (OSError, ValueError, pyarrow.ArrowException) as error:
+            raise OutputError(f"{path}: not a readable Parquet file ({_short(error)})") from error
+        self._check_columns(path, columns)
+        return columns
+
+    def _check_columns(self, path: Path, columns: Series) -> None:
+        axes = [f"x{k + 1}" for k in range(len(self.manifest.platform_axes))]
+        needed = ["t", *self.manifest.joints, *axes, *(f"xd{axis[1:]}" for axis in axes)]
+        for name in needed:
+            if name not in columns:
+                raise OutputError(f'{path}: column "{name}" is missing; needed: {", ".join(needed)}', column=name)
+        if len(columns["t"]) == 0:
+            raise OutputError(f"{path}: holds no samples; allowed: at least 1")
+
+
+def load_run(directory: Path) -> Run:
+    """Read manifest.json and summary.csv of a run directory and check that they belong together.
+
+    Raises
+    ------
+    OutputError
+        One line that names the file, the key or line, the value and what is allowed.
+    """
+    manifest = _read_manifest(directory / "manifest.json")
+    rows = _read_summary(directory / "summary.csv")
+    for number, row in enumerate(rows, start=2):
+        for what, value, valid in (
+            ("case", row.case, manifest.cases),
+            ("candidate", row.candidate, manifest.candidates),
+            ("joint", row.joint, manifest.joints),
+        ):
+            if value not in valid:
+                raise OutputError(
+                    f"{directory / 'summary.csv'}: line {number}: {what} {value!r} is not in manifest.json; "
+                    f"valid: {', '.join(valid)}"
+                )
+    return Run(directory, manifest, rows)
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise OutputError(f"{path}: missing; a run directory holds manifest.json and summary.csv") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise OutputError(f"{path}: cannot be read ({_short(error)})") from error
+
+
+def _read_manifest(path: Path) -> Manifest:
+    text = _read_text(path)
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise OutputError(f"{path}: not valid JSON ({_short(error)})") from error
+    version = data.get("format") if isinstance(data, dict) else None
+    if version != FORMAT_VERSION:
+        raise OutputError(f"{path}: format {version!r} is not supported; allowed: {FORMAT_VERSION}", key="format")
+    try:
+        manifest = Manifest.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in first["loc"])
+        value = "" if first["type"] == "missing" else f", got {str(first['input'])[:60]!r}"
+        raise OutputError(f"{path}: key {key!r}: {first['msg']}{value}", key=key) from error
+    count = len(manifest.joints)
+    for key in ("coordinate_units", "force_units"):
+        if len(getattr(manifest, key)) != count:
+            raise OutputError(f"{path}: key {key!r}: {len(getattr(manifest, key))} units for {count} joints", key=key)
+    return manifest
+
+
+REQUIRED_COLUMNS = (
+    *("case", "candidate", "reference", "joint", "peak_error", "rms_error", "pointwise_error", "worst_time_s"),
+    *("bound", "verdict", "kind", "peak_reference", "unit", "pointwise_skipped"),
+)
+
+
+def _read_summary(path: Path) -> tuple[ErrorRow, ...]:
+    # The csv module and not pandas: a case may be called "nan" or "1e5" and must stay text.
+    reader = csv.DictReader(io.StringIO(_read_text(path), newline=""))
+    header = reader.fieldnames or []
+    for column in REQUIRED_COLUMNS:
+        if column not in header:
+            raise OutputError(f'{path}: column "{column}" is missing; needed: {", ".join(REQUIRED_COLUMNS)}')
+    rows = []
+    for record in reader:
+        if None in record or None in record.values():
+            raise OutputError(f"{path}: line {reader.line_num}: expected {len(header)} fields; the line is torn")
+        rows.append(_row(path, reader.line_num, record))
+    return tuple(rows)
+
+
+def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
+    def number(column: str) -> float:
+        try:
+            return float(record[column])
+        except ValueError as error:
+            raise OutputError(
+                f"{path}: line {line}: {column} is {record[column][:60]!r}; allowed: a number", column=column
+            ) from error
+
+    return ErrorRow(
+        case=record["case"],
+        candidate=record["candidate"],
+        reference=record["reference"],
+        joint=record["joint"],
+        peak_error=number("peak_error"),
+        rms_error=number("rms_error"),
+        pointwise_error=number("pointwise_error"),
+        worst_time_s=number("worst_time_s"),
+        bound=number("bound") if record["bound"].strip() else None,
+        verdict=record["verdict"],
+        kind=record["kind"],
+        peak_reference=number("peak_reference"),
+        unit=record["unit"],
+        pointwise_skipped=int(number("pointwise_skipped")),
+    )
+
+
+def _short(error: BaseException) -> str:
+    return " ".join(str(error).split())[:160] or type(error).__name__

@@ -1,0 +1,143 @@
+"""The part of manifest.json that a report reads, as typed records.
+
+Keys that a report does not need are ignored; a key that it cannot do without and that is missing is an error.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+FORMAT_VERSION = 1
+"""The version of the run directory that this reader understands."""
+
+
+class Record(BaseModel):
+    """Base: immutable, tolerant of further keys."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore", protected_namespaces=())
+
+
+class ModelRecord(Record):
+    """The MJCF file and the mechanism that was read from it."""
+
+    file: str
+    sha256: str
+    mechanism: str
+    title: str = ""
+    reference_key: str = ""
+
+
+class ParameterRecord(Record):
+    """One parameter of the mechanism, SI."""
+
+    name: str
+    value: float
+    unit: str = ""
+    meaning: str = ""
+    source: str = ""
+
+
+class CandidateRecord(Record):
+    """One closed form and the mass model whose assumption it shares."""
+
+    mass_model: str
+    description: str = ""
+    source: str = ""
+
+
+class ClaimRecord(Record):
+    """A statement of a paper next to what was measured; ``holds`` is None where it cannot be decided."""
+
+    id: str
+    text: str
+    source: str = ""
+    kind: str = "value"
+    claimed: float
+    unit: str = ""
+    measured: float | None = None
+    holds: bool | None = None
+    note: str = ""
+
+
+class FigureRecord(Record):
+    """A figure that the campaign asks for."""
+
+    id: str
+    title: str
+    case: str
+    kind: Literal["platform", "platform_velocity", "platform_acceleration", "torque"]
+    joint: str | None = None
+    curves: tuple[str, ...] = ()
+    """``cand:NAME`` or ``ref:MASS_MODEL``"""
+    source: str = ""
+
+
+class SingularityRecord(Record):
+    """The smallest value of a dimensionless determinant over a case, and when."""
+
+    min: float
+    time: float | None = None
+
+
+class CaseRecord(Record):
+    """One case: its status and the scalar evidence about mechanism and reference. Missing evidence is None."""
+
+    status: Literal["passed", "failed", "error"]
+    title: str = ""
+    description: str = ""
+    message: str | None = None
+    samples: int | None = None
+    duration_s: float | None = None
+    parameters: dict[str, float] = {}
+    external_force: Any = None
+    mobility: int | None = None
+    rank: int | None = None
+    constraint_rows: int | None = None
+    redundant_rows: int | None = None
+    idle_freedoms: int | None = None
+    closure_residual: float | None = None
+    velocity_residual: float | None = None
+    acceleration_residual: float | None = None
+    condition: float | None = None
+    peak_speed: float | None = None
+    peak_acceleration: float | None = None
+    speed_at_s: float | None = None
+    acceleration_at_s: float | None = None
+    singularity: dict[str, SingularityRecord] = {}
+    kinematics: dict[str, float] = {}
+    warnings: tuple[str, ...] = ()
+
+
+class Manifest(Record):
+    """manifest.json."""
+
+    format: Literal[1]
+    campaign: str
+    title: str = ""
+    description: str = ""
+    spec_file: str = ""
+    spec: dict[str, Any] = {}
+    model: ModelRecord
+    joints: tuple[str, ...]
+    coordinate_units: tuple[str, ...]
+    force_units: tuple[str, ...]
+    platform_axes: tuple[str, ...] = ("x1", "x2", "x3")
+    parameters: tuple[ParameterRecord, ...] = ()
+    versions: dict[str, str] = {}
+    machine: dict[str, Any] = {}
+    git_commit: str | None = None
+    command: str = ""
+    started: str = ""
+    finished: str = ""
+    seconds: float | None = None
+    status: Literal["passed", "failed", "error"]
+    candidates: dict[str, CandidateRecord]
+    claims: tuple[ClaimRecord, ...] = ()
+    figures: tuple[FigureRecord, ...] = ()
+    cases: dict[str, CaseRecord]
+
+    def unit_of(self, joint: str) -> str:
+        """Unit of the force or torque of *joint*."""
+        return self.force_units[self.joints.index(joint)]

@@ -1,0 +1,74 @@
+"""Tables of a report: cells, columns, a sentence above and one below; the templates turn them into HTML or Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Status:
+    """An outcome that reads the same without colour: a symbol and words, and a key for the style sheet."""
+
+    key: str
+    symbol: str
+    text: str
+    loud: bool = False
+
+
+PASSED = Status("passed", "✓", "passed")
+FAILED = Status("failed", "✗", "FAILED", loud=True)
+ERROR = Status("error", "⚠", "ERROR, not computed", loud=True)
+MEASURED = Status("measured", "", "measured")
+HOLDS = Status("passed", "✓", "holds")
+REFUTED = Status("refuted", "✗", "does not hold")
+UNDECIDED = Status("undecided", "?", "cannot be decided")
+
+CASE_STATUS = {"passed": PASSED, "failed": FAILED, "error": ERROR}
+VERDICT_STATUS = {"pass": PASSED, "fail": FAILED, "measured": MEASURED}
+CLAIM_STATUS = {True: HOLDS, False: REFUTED, None: UNDECIDED}
+
+
+def verdict_status(verdict: str) -> Status:
+    """Return the status of a verdict of summary.csv; one that this version does not know is shown as it stands."""
+    return VERDICT_STATUS.get(verdict, Status("undecided", "?", verdict))
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column's heading; numbers are right-aligned."""
+
+    title: str
+    numeric: bool = False
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a cell shows; ``value`` is the number behind it at full precision, ``link`` an anchor in the report."""
+
+    text: str = ""
+    value: float | None = None
+    status: Status | None = None
+    link: str | None = None
+    emphasis: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with the sentence that says what it shows and the sentence that says how to read it."""
+
+    key: str
+    shows: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    reading: str
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(f"table {self.key}: {len(row)} cells in a row of {len(self.columns)} columns")
+
+
+def columns(names: Sequence[str], numeric: Sequence[str] = ()) -> tuple[Column, ...]:
+    """Make columns from their titles; those in *numeric* are right-aligned."""
+    return tuple(Column(name, name in numeric) for name in names)

@@ -1,0 +1,551 @@
+"""The report: it shows what is stored, all of it, safely; and it says so in one line when the store is torn."""
+
+from __future__ import annotations
+
+import csv
+import html
+import json
+import re
+import time
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from workbench.errors import OutputError
+from workbench.metrics import relative_error
+from workbench.report import build_report
+from workbench.report.text import error_fraction, escape_markdown, percent
+
+JOINTS = ("q1", "q2", "q3")
+UNITS = ("N", "N m", "N m")
+CANDIDATES = {
+    "lumped": "lumped",
+    "lumped-appendix": "lumped",
+    "distributed": "distributed",
+    "distributed-rotation": "distributed",
+}
+PAIRS = [(name, model) for name, model in CANDIDATES.items()] + [("lumped", "distributed")]
+BOUND = 1e-10
+NASTY = '<script>alert("1")</script> | *b* _i_ `c` [x](http://evil.example) $a$ \u4e2d\u6587 \U0001f916 \' & # '
+
+
+def make_run(
+    folder: Path, cases: int = 2, samples: int = 120, edit: Callable[[dict[str, Any], list[dict[str, Any]]], None] | None = None
+) -> Path:
+    """Write a synthetic run directory: sinusoidal torques, round-off errors, and one case that ended in an error."""
+    (folder / "series").mkdir(parents=True)
+    random = np.random.default_rng(1)
+    t = np.linspace(0.1, 5.0, samples)
+    rows: list[dict[str, Any]] = []
+    records: dict[str, Any] = {}
+    for number in range(cases):
+        case = f"sim{number + 1}"
+        data: dict[str, Any] = {"t": t}
+        for k in range(3):
+            w = 2.0 + 3 * (k > 0) + number
+            data[f"q{k + 1}"] = 0.1 * np.sin(w * t)
+            data[f"qd{k + 1}"] = 0.1 * w * np.cos(w * t)
+            data[f"qdd{k + 1}"] = -0.1 * w**2 * np.sin(w * t)
+            data[f"x{k + 1}"] = 0.2 * np.cos(w * t + k)
+            data[f"xd{k + 1}"] = -0.2 * w * np.sin(w * t + k)
+            data[f"xdd{k + 1}"] = -0.2 * w**2 * np.cos(w * t + k)
+            data[f"reaction_E_{'xyz'[k]}"] = np.cos(t)
+            base = (k + 1) * np.sin(w * t) + 0.3 * k
+            data[f"ref_distributed_q{k + 1}"] = base
+            data[f"ref_lumped_q{k + 1}"] = base * (1 - 0.03 * np.cos(t))
+            for name, model in CANDIDATES.items():
+                noise = 1e-15 * random.standard_normal(samples)
+                data[f"cand_{name}_q{k + 1}"] = data[f"ref_{model}_q{k + 1}"] + noise
+        data["closure_residual"] = np.full(samples, 2e-16)
+        pd.DataFrame(data).to_parquet(folder / "series" / f"{case}.parquet")
+        for name, model in PAIRS:
+            for k, joint in enumerate(JOINTS):
+                found = relative_error(data[f"cand_{name}_{joint}"], data[f"ref_{model}_{joint}"])
+                verification = CANDIDATES[name] == model
+                rows.append(
+                    {
+                        "case": case,
+                        "candidate": name,
+                        "reference": model,
+                        "joint": joint,
+                        "peak_error": found.peak_error,
+                        "rms_error": found.rms_error,
+                        "pointwise_error": found.pointwise_error,
+                        "worst_time_s": t[found.worst_index],
+                        "bound": BOUND if verification else "",
+                        "verdict": "pass" if verification else "measured",
+                        "peak_reference": found.peak_reference,
+                        "unit": UNITS[k],
+                        "pointwise_skipped": found.pointwise_skipped,
+                        "kind": "verification" if verification else "modelling",
+                    }
+                )
+        records[case] = {
+            "status": "passed",
+            "title": f"Simulation {number + 1}",
+            "description": "Sinusoids on all joints, started after the jump at rest.",
+            "message": None,
+            "samples": samples,
+            "duration_s": 4.9,
+            "parameters": {"payload": 0.5} if number else {},
+            "external_force": [0.0, 0.0, 0.0],
+            "mobility": 3,
+            "rank": 14,
+            "constraint_rows": 15,
+            "redundant_rows": 1,
+            "idle_freedoms": 2,
+            "closure_residual": 2.5e-16,
+            "velocity_residual": 3.5e-15,
+            "acceleration_residual": 4.5e-14,
+            "condition": 12.5,
+            "peak_speed": 0.5541,
+            "peak_acceleration": 3.8621,
+            "speed_at_s": 1.25,
+            "acceleration_at_s": 2.5,
+            "singularity": {"det J_x": {"min": 0.312, "time": 1.5}, "det J_q": {"min": 0.0451, "time": 2.5}},
+            "kinematics": {"position": 1.1e-16, "velocity": 2.2e-16, "acceleration": 3.3e-15},
+            "warnings": ["det J_q falls to 0.045 at 2.5 s: close to the workspace boundary"] if number else [],
+        }
+    records["broken"] = {
+        "status": "error",
+        "title": "A motion that leaves the workspace",
+        "description": "",
+        "message": "case broken: motion leaves the workspace at t = 0.31 s, joint q2",
+    }
+    curves = ["cand:lumped", "ref:lumped", "cand:distributed", "ref:distributed"]
+    figures = [
+        {"id": "fig5", "title": "End effector position", "case": "sim1", "kind": "platform", "source": "[Paper2010] Fig. 5"},
+        *(
+            {"id": f"fig{n}", "title": f"Joint {j}", "case": "sim1", "kind": "torque", "joint": j, "curves": c, "source": ""}
+            for n, j, c in [(6, "q1", curves[:2]), (9, "q1", curves), (12, "q2", [curves[0], curves[2]])]
+        ),
+        {"id": "fig99", "title": "From a case with an error", "case": "broken", "kind": "platform", "source": ""},
+        {"id": "fig98", "title": "From a case left out", "case": "absent", "kind": "platform", "source": ""},
+        {"id": "fig97", "title": "Unknown", "case": "sim1", "kind": "torque", "joint": "q1", "curves": ["cand:nobody"]},
+    ]
+    claims = [
+        {"id": "a", "text": "Errors below 0.1 %", "source": "[Paper2010] 4", "kind": "upper", "claimed": 0.1, "unit": "%",
+         "measured": 1.7e-13, "holds": True, "note": ""},
+        {"id": "b", "text": "Mass models differ by less", "source": "[Paper2010] 4", "kind": "upper", "claimed": 2.0, "unit": "%",
+         "measured": 3.0123, "holds": False, "note": "tau1"},
+        {"id": "c", "text": "Takes 703 us", "source": "[Paper2010] 4", "kind": "value", "claimed": 703, "unit": "us",
+         "measured": None, "holds": None, "note": "another machine"},
+    ]  # fmt: skip
+    manifest: dict[str, Any] = {
+        "format": 1,
+        "campaign": "synthetic",
+        "title": "A synthetic campaign",
+        "description": "Made by a test.",
+        "spec_file": "campaigns/synthetic.toml",
+        "spec": {"campaign": {"name": "synthetic"}},
+        "model": {
+            "file": "models/robot.xml",
+            "sha256": "ab" * 32,
+            "mechanism": "robot",
+            "title": "A robot",
+            "reference_key": "Paper2010",
+        },
+        "joints": list(JOINTS),
+        "coordinate_units": ["m", "rad", "rad"],
+        "force_units": list(UNITS),
+        "platform_axes": ["x1", "x2", "x3"],
+        "parameters": [
+            {"name": "a1", "value": 0.2, "unit": "m", "meaning": "arm length", "source": "[Paper2010] Table 1"},
+            {"name": "k1", "value": 0.5, "unit": "1", "meaning": "mass centre", "source": ""},
+        ],
+        "versions": {"workbench": "0.1.0", "mujoco": "4.0.1"},
+        "machine": {"system": "Linux", "processor": "x86_64", "cores": 2},
+        "git_commit": "0123abc",
+        "command": "workbench run campaigns/synthetic.toml",
+        "started": "2030-01-01T00:00:00Z",
+        "finished": "2030-01-01T00:00:09Z",
+        "seconds": 9.0,
+        "status": "passed",
+        "candidates": {n: {"mass_model": m, "description": f"The {n} form.", "source": ""} for n, m in CANDIDATES.items()},
+        "claims": claims,
+        "figures": figures,
+        "cases": records,
+    }
+    if edit is not None:
+        edit(manifest, rows)
+    (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    with (folder / "summary.csv").open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    return folder
+
+
+def without_error_case(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+    del manifest["cases"]["broken"]
+
+
+class Tables(HTMLParser):
+    """Collect tables (as lists of rows of cell texts), tags and ids of a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tables: dict[str, list[list[str]]] = {}
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.current: list[list[str]] | None = None
+        self.cell = False
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        attributes = dict(attrs)
+        self.tags.append((tag, attributes))
+        if tag == "table":
+            self.current = self.tables.setdefault(str(attributes["id"]).removeprefix("table-"), [])
+        elif tag == "tr" and self.current is not None:
+            self.current.append([])
+        elif tag in ("td", "th") and self.current is not None:
+            self.current[-1].append("")
+            self.cell = True
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in ("td", "th"):
+            self.cell = False
+        elif tag == "table":
+            self.current = None
+
+    def handle_data(self, data: str) -> None:
+        if self.current is not None and self.cell:
+            self.current[-1][-1] += data
+
+
+def parse(run: Path) -> Tables:
+    parser = Tables()
+    parser.feed((run / "report.html").read_text(encoding="utf-8"))
+    return parser
+
+
+def markdown_tables(text: str) -> list[list[list[str]]]:
+    """Parse pipe tables as GitHub does: a cell ends at a pipe that no backslash escapes."""
+    tables: list[list[list[str]]] = []
+    inside = False
+    for line in text.splitlines():
+        if line.startswith("|"):
+            if not inside:
+                tables.append([])
+            cells = re.split(r"(?<!\\)\|", line.strip())[1:-1]
+            tables[-1].append([html.unescape(cell.strip()) for cell in cells])
+        inside = line.startswith("|")
+    return tables
+
+
+def summary(run: Path) -> list[dict[str, str]]:
+    with (run / "summary.csv").open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = make_run(tmp_path_factory.mktemp("report") / "run")
+    build_report(folder)
+    return folder
+
+
+def test_files_are_those_returned_and_nothing_else(tmp_path: Path) -> None:
+    folder = make_run(tmp_path / "run")
+    (folder / "figures").mkdir()
+    (folder / "figures" / "case-gone-torque-1.svg").write_text("stale")
+    (folder / "figures" / "mine.svg").write_text("the user's own")
+    written = build_report(folder)
+    assert {"report.html", "report.md"} <= {path.name for path in written}
+    found = {path for path in folder.rglob("*") if path.is_file()}
+    inputs = {folder / "manifest.json", folder / "summary.csv", *(folder / "series").iterdir()}
+    assert found == set(written) | inputs | {folder / "figures" / "mine.svg"}
+
+
+def test_every_number_of_the_summary_stands_in_its_case_table(run: Path) -> None:
+    tables = parse(run).tables
+    rows = summary(run)
+    assert len(rows) == 30
+    for row in rows:
+        shown = [r for r in tables[f"case-{row['case']}-{row['kind']}"] if r[:3] == [row["joint"], row["candidate"], row["reference"]]]
+        assert len(shown) == 1
+        number = error_fraction if row["kind"] == "verification" else percent
+        expected = [number(float(row[key])) for key in ("peak_error", "rms_error", "pointwise_error")]
+        assert shown[0][3:6] == expected
+        assert shown[0][6] == f"{row['pointwise_skipped']} of 120"
+        assert shown[0][7].startswith(f"{float(row['worst_time_s']):.4g}")
+        assert shown[0][8].startswith(f"{float(row['peak_reference']):.4g}")
+
+
+def test_full_precision_stands_behind_the_rounded_numbers(run: Path) -> None:
+    values = {attributes.get("data-value") for _, attributes in parse(run).tags}
+    for row in summary(run):
+        assert {row["peak_error"], row["rms_error"], row["pointwise_error"]} <= values
+
+
+@pytest.mark.parametrize("column", ["peak_error", "rms_error", "pointwise_error", "worst_time_s", "peak_reference"])
+def test_a_spoilt_number_shows(run: Path, tmp_path: Path, column: str) -> None:
+    def spoil(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        rows[4][column] *= 1.5
+
+    spoilt = make_run(tmp_path / "run", edit=spoil)
+    build_report(spoilt)
+    for name in ("report.html", "report.md"):
+        assert (spoilt / name).read_text(encoding="utf-8") != (run / name).read_text(encoding="utf-8")
+    key = f"case-sim1-{summary(spoilt)[4]['kind']}"
+    assert parse(spoilt).tables[key] != parse(run).tables[key]
+
+
+def test_worst_rows_come_first(tmp_path: Path) -> None:
+    def spoil(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        rows[7] |= {"peak_error": 3e-9, "verdict": "fail"}
+        rows[20] |= {"peak_error": float("nan"), "verdict": "fail"}
+        manifest["cases"]["sim1"]["status"] = manifest["status"] = "failed"
+
+    folder = make_run(tmp_path / "run", edit=spoil)
+    build_report(folder)
+    tables = parse(folder).tables
+    first, second, third = tables["worst-verification"][1:4]
+    assert first[4] == "not a number"
+    assert (second[4], second[6]) == ("3.00e-09", "30")
+    assert "FAILED" in first[-1]
+    assert "FAILED" in second[-1]
+    assert "passed" in third[-1]
+    modelling = tables["worst-modelling"]
+    assert modelling[0][3:] == ["q1 [N]", "q2 [N·m]", "q3 [N·m]"]
+    assert len(modelling) == 1 + 2
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "2 of 24 verifications exceed their bound" in text
+
+
+def test_verdicts_differ_in_words_and_style(tmp_path: Path) -> None:
+    def fail(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        without_error_case(manifest, rows)
+        rows[0] |= {"peak_error": 1.02, "verdict": "fail"}  # and the manifest still says "passed"
+
+    seen = {}
+    for name, edit in {"error": None, "failed": fail, "passed": without_error_case}.items():
+        folder = make_run(tmp_path / name, edit=edit)
+        build_report(folder)
+        text = (folder / "report.html").read_text(encoding="utf-8")
+        seen[name] = re.search(r'<p class="verdict verdict-(\w+)">(.*)</p>', text)
+        assert seen[name][1] == name
+    assert "All 24 verifications in 2 cases hold their bounds" in seen["passed"][2]
+    assert "1.02e+00" in seen["failed"][2]
+    assert "1 of 3 cases could not be computed (broken)" in seen["error"][2]
+
+
+def test_error_case_has_its_message_and_no_series(run: Path) -> None:
+    text = (run / "report.html").read_text(encoding="utf-8")
+    section = text[text.index('<article id="case-broken"') :]
+    section = section[: section.index("</article>")]
+    assert "motion leaves the workspace at t = 0.31 s" in section
+    assert "ERROR, not computed" in section
+    assert "<svg" not in section
+    assert "<table" not in section
+
+
+def test_claims_say_in_words_whether_they_hold(run: Path) -> None:
+    rows = parse(run).tables["claims"][1:]
+    assert [row[4].split(" ", 1)[1] for row in rows] == ["holds", "does not hold", "cannot be decided"]
+    assert rows[0][2:4] == ["at most 0.1 %", "1.7e-13 %"]
+    assert rows[1][3] == "3.012 %"
+    assert rows[2][3] == "–"
+
+
+def test_sections_stand_in_reading_order(run: Path) -> None:
+    order = ["verdict", "claims", "worst", "cases", "figures", "parameters", "reproduce", "limits"]
+    found = [attributes["id"] for tag, attributes in parse(run).tags if tag == "section"]
+    assert found == order
+    titles = re.findall(r"^## (.*)$", (run / "report.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(titles) == len(order)
+
+
+def test_campaign_figures_are_drawn_or_say_why_not(run: Path) -> None:
+    names = {path.name for path in (run / "figures").iterdir()}
+    assert {f"figure-fig{n}.svg" for n in (5, 6, 9, 12)} <= names
+    assert not {f"figure-fig{n}.svg" for n in (97, 98, 99)} & names
+    for name in ("report.html", "report.md"):
+        text = (run / name).read_text(encoding="utf-8")
+        assert text.count("Not drawn: ") == 3
+
+
+def test_page_loads_nothing_and_its_links_lead_somewhere(run: Path) -> None:
+    parser = parse(run)
+    ids = [str(attributes["id"]) for _, attributes in parser.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    for tag, attributes in parser.tags:
+        assert tag not in ("script", "link", "img", "iframe", "object", "embed")
+        for name in ("src", "href", "xlink:href", "clip-path"):
+            target = attributes.get(name)
+            if target is not None:
+                anchor = re.fullmatch(r"(?:#|url\(#)([^)]+)\)?", target)
+                assert anchor is not None, target
+                assert anchor[1] in ids
+    text = (run / "report.html").read_text(encoding="utf-8")
+    assert "http:" not in text
+    assert "https:" not in text
+    assert "@import" not in text
+    assert "url(h" not in text
+
+
+def test_figures_have_alternative_texts(run: Path) -> None:
+    drawings = [attributes for tag, attributes in parse(run).tags if tag == "svg"]
+    assert len(drawings) == 2 * 6 + 4
+    assert all(len(str(attributes["aria-label"])) > 30 for attributes in drawings)
+    images = re.findall(r'<img src="([^"]*)" alt="([^"]*)"', (run / "report.md").read_text(encoding="utf-8"))
+    assert len(images) == len(drawings)
+    for source, alt in images:
+        assert (run / source).is_file()
+        assert len(alt) > 30
+        ElementTree.fromstring((run / source).read_text(encoding="utf-8"))
+
+
+def test_same_results_same_bytes(run: Path, tmp_path: Path) -> None:
+    again = make_run(tmp_path / "elsewhere")
+    for path in build_report(again):
+        assert path.read_bytes() == (run / path.relative_to(again)).read_bytes(), path.name
+
+
+def test_user_text_is_shown_as_text(tmp_path: Path) -> None:
+    nasty = NASTY + "x" * 300
+
+    def edit(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        manifest["title"] = manifest["description"] = manifest["command"] = nasty
+        manifest["parameters"][0]["meaning"] = nasty + "\nnext line"
+        manifest["claims"][0] |= {"text": nasty, "note": "```\n" + nasty, "source": nasty}
+        manifest["figures"][0] |= {"title": nasty, "source": nasty, "id": nasty}
+        manifest["cases"]["sim1"] |= {"title": nasty, "description": nasty, "message": nasty, "warnings": [nasty]}
+        manifest["cases"][nasty] = {"status": "error", "message": nasty}
+        manifest["candidates"][nasty] = {"mass_model": nasty, "description": nasty, "source": nasty}
+        for row in rows:
+            if row["candidate"] == "lumped-appendix":
+                row["candidate"] = nasty
+
+    folder = make_run(tmp_path / "run", edit=edit)
+    build_report(folder)
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    parser = parse(folder)
+    assert not [tag for tag, _ in parser.tags if tag in ("script", "img", "b")]
+    assert parser.tables["claims"][1][0] == nasty
+    assert "<script" not in page
+    note = (folder / "report.md").read_text(encoding="utf-8")
+    outside = re.sub(r"^(`{3,})text\n.*?\n\1$", "", note, flags=re.DOTALL | re.MULTILINE)
+    assert "<script" not in outside
+    assert not re.search(r"(?<!\\)\]\(http", outside)
+    for path in (folder / "figures").iterdir():
+        ElementTree.fromstring(path.read_text(encoding="utf-8"))
+        assert re.fullmatch(r"[a-z0-9-]{1,80}\.svg", path.name)
+
+
+def test_markdown_tables_are_whole(run: Path, tmp_path: Path) -> None:
+    def edit(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        manifest["claims"][0]["text"] = "a | b\\| c\nd"
+
+    folder = make_run(tmp_path / "run", edit=edit)
+    build_report(folder)
+    tables = markdown_tables((folder / "report.md").read_text(encoding="utf-8"))
+    page = parse(folder).tables
+    assert len(tables) == len(page)
+    for table, same in zip(tables, page.values(), strict=True):
+        assert len(table) == len(same) + 1
+        assert all(len(row) == len(table[0]) for row in table)
+    claims = next(table for table in tables if table[0][0] == "Claim")
+    assert claims[2][0] == r"a \| b\\\| c d"
+    shown = {cell.strip("*") for table in tables for row in table for cell in row}
+    for row in summary(folder):
+        number = error_fraction if row["kind"] == "verification" else percent
+        assert number(float(row["peak_error"])) in shown
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("a|b", r"a\|b"),
+        ("<b> & c", "&lt;b&gt; &amp; c"),
+        ("1. first", r"1\. first"),
+        ("- item", r"\- item"),
+        ("-0.5 and 0.25", "-0.5 and 0.25"),
+        ("# head\n\nnext", r"\# head next"),
+        ("[x](y)", r"\[x\](y)"),
+        ("plain text, 3.2e-16", "plain text, 3.2e-16"),
+    ],
+)
+def test_markdown_escaping(text: str, written: str) -> None:
+    assert str(escape_markdown(text)) == written
+
+
+def truncate(name: str) -> Callable[[Path], None]:
+    def spoil(folder: Path) -> None:
+        data = (folder / name).read_bytes()
+        (folder / name).write_bytes(data[: len(data) * 2 // 3 + 7])
+
+    return spoil
+
+
+def remove(name: str) -> Callable[[Path], None]:
+    return lambda folder: (folder / name).unlink()
+
+
+def replace(name: str, old: str, new: str) -> Callable[[Path], None]:
+    def spoil(folder: Path) -> None:
+        text = (folder / name).read_text(encoding="utf-8")
+        assert old in text
+        (folder / name).write_text(text.replace(old, new), encoding="utf-8")
+
+    return spoil
+
+
+def drop_column(name: str) -> Callable[[Path], None]:
+    def spoil(folder: Path) -> None:
+        path = folder / "series" / "sim2.parquet"
+        pd.read_parquet(path).drop(columns=[name]).to_parquet(path)
+
+    return spoil
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (remove("manifest.json"), "manifest.json: missing"),
+        (remove("summary.csv"), "summary.csv: missing"),
+        (remove("series/sim2.parquet"), "sim2.parquet: missing"),
+        (truncate("manifest.json"), "manifest.json: not valid JSON"),
+        (truncate("summary.csv"), "summary.csv: line"),
+        (truncate("series/sim2.parquet"), "sim2.parquet: not a readable Parquet file"),
+        (drop_column("x2"), 'column "x2" is missing'),
+        (replace("manifest.json", '"format": 1', '"format": 7'), "format 7 is not supported; allowed: 1"),
+        (replace("manifest.json", '"force_units"', '"force_unit"'), "key 'force_units': Field required"),
+        (replace("manifest.json", '"status": "error"', '"status": "odd"'), "cases.broken.status"),
+        (replace("summary.csv", "peak_error", "peek_error"), 'column "peak_error" is missing'),
+        (replace("summary.csv", "sim2", "sim9"), "case 'sim9' is not in manifest.json"),
+        (replace("summary.csv", ",1e-10,", ",small,"), "bound is 'small'; allowed: a number"),
+        (replace("manifest.json", '"sim2"', '"../sim2"'), "is not in manifest.json"),
+        (lambda folder: (folder / "figures").write_text("a file"), "the report cannot be written"),
+    ],
+)  # fmt: skip
+def test_torn_results_give_one_line(tmp_path: Path, spoil: Callable[[Path], None], said: str) -> None:
+    folder = make_run(tmp_path / "run")
+    spoil(folder)
+    before = sorted(folder.rglob("*"))
+    with pytest.raises(OutputError) as caught:
+        build_report(folder)
+    message = str(caught.value)
+    assert said in message
+    assert "\n" not in message
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_a_case_name_cannot_lead_out_of_the_directory(tmp_path: Path) -> None:
+    def edit(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        manifest["cases"]["../series/sim1"] = manifest["cases"]["sim1"]
+
+    with pytest.raises(OutputError, match="cannot be a file name"):
+        build_report(make_run(tmp_path / "run", edit=edit))
+
+
+def test_a_large_campaign_takes_seconds(tmp_path: Path) -> None:
+    folder = make_run(tmp_path / "run", cases=10, samples=500)
+    started = time.process_time()
+    build_report(folder)
+    assert time.process_time() - started < 5.0
+    assert (folder / "report.html").stat().st_size < 3e6
