@@ -1,7 +1,7 @@
 """The translational 4-RPRP robot built from two planar loops, of [GarciaMurillo2016].
 
-Frame: the paper's, y up, gravity (0, -g, 0). Limbs 1 and 3 turn about axes parallel to x and carry the ends of rod 1-3, limbs
-2 and 4 turn about axes parallel to z and carry rod 2-4; both rods slide in the platform. The equations stand in
+Frame: the paper's, y up, gravity (0, -g, 0). Limbs 1 and 3 turn about axes parallel to x and carry the ends of rod 1-3,
+limbs 2 and 4 turn about axes parallel to z and carry rod 2-4; both rods slide in the platform. The equations stand in
 `planar_4rprp_kernel`; this module gives them names, units, checks and errors.
 """
 
@@ -133,9 +133,7 @@ class Planar4Rprp(Mechanism):
         jacobian[:, 0, 1] = q2 / px
         return jacobian
 
-    def platform_motion(
-        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def platform_motion(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Position, velocity and acceleration of P, each ``(n, 3)``, SI, paper frame.
 
         Raises
@@ -169,8 +167,8 @@ class Planar4Rprp(Mechanism):
     def singularity_measures(self, q: ArrayLike) -> dict[str, FloatArray]:
         """``det J_r`` and ``q4 / a``, each ``(n,)`` without unit.
 
-        det J_r = b Px Py / (q1 q2 q3) vanishes with Px or Py and at no other pose. Where q4 vanishes the passive limb has no
-        direction, and its inertia no bound.
+        det J_r = b Px Py / (q1 q2 q3) vanishes with Px or Py and at no other pose. Where q4 vanishes the passive limb
+        has no direction, and its inertia no bound.
 
         Raises
         ------

@@ -1,8 +1,9 @@
 """The equations of the 4-RPRP robot, once: scalar code that numba compiles.
 
-Each limb moves in one plane, so the pair (s, y) of B_i - A_i, s along z for limbs 1 and 3 and along x for limbs 2 and 4,
-describes it whole: r = (s, y) = q w, and its angle's rate is (w x rd)/q. The rods and the platform only translate. Every
-mass model is nothing but other constants (`pack`); lumped masses have no rotational inertia. Frame: the paper's, y up.
+Each limb moves in one plane, so the pair (s, y) of B_i - A_i, s along z for limbs 1 and 3 and along x for limbs 2 and
+4, describes it whole: r = (s, y) = q w, and its angle's rate is (w x rd)/q. The rods and the platform only translate.
+Every mass model is nothing but other constants (`pack`); lumped masses have no rotational inertia. Frame: the paper's,
+y up.
 Derivation: docs/derivations/planar_4rprp.md.
 """
 
@@ -50,7 +51,7 @@ def pack(p: Any, bar_inertia: float = 1.0) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def _position(c, q1, q2, q3):  # type: ignore[no-untyped-def]
-    """Px, Py, Pz on the home branch Px > 0, Py > 0; NaN where the limbs cannot meet. [GarciaMurillo2016] eq. (14)-(16)."""
+    """Px, Py, Pz with Px > 0, Py > 0; NaN where the limbs cannot meet. [GarciaMurillo2016] eq. (14)-(16)."""
     b = c[1]
     z = 0.5 * (b + (q1 - q3) * (q1 + q3) / b)
     y = math.sqrt((q1 - z) * (q1 + z))

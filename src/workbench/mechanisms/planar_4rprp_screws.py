@@ -1,11 +1,12 @@
 """The 4-RPRP robot by screws, the paper's own route: [GarciaMurillo2016] sections 5 and 6, equation by equation.
 
-Pole: the origin O = A1 of the paper's frame. The six screws of a limb, in order from the base, are those of the equivalent
-SPRP chain: 0$1 (revolute u at A_i), the two virtual revolutes 1$2 (w) and 2$3 (v) at A_i, 3$4 (prismatic w), 4$5 (revolute u at
-B_i) and 5$6 (prismatic u, rod in platform). Nothing here shares code with the direct form in `planar_4rprp_kernel`.
+Pole: the origin O = A1 of the paper's frame. The six screws of a limb, in order from the base, are those of the
+equivalent SPRP chain: 0$1 (revolute u at A_i), the two virtual revolutes 1$2 (w) and 2$3 (v) at A_i, 3$4 (prismatic w),
+4$5 (revolute u at B_i) and 5$6 (prismatic u, rod in platform). Nothing here shares code with the direct form in
+`planar_4rprp_kernel`.
 
-Moments are ``A x u``. The text that reached us reads ``u x A``; with that the joint rates and the Lie screws change sign
-(``moment_sign=-1`` shows what follows).
+Moments are ``A x u``. The text that reached us reads ``u x A``; with that the revolutes' rates and the Lie-screw terms
+change sign (``moment_sign=-1`` shows what follows).
 """
 
 from __future__ import annotations
@@ -99,14 +100,14 @@ def limb(parameters: Any, number: int, x: FloatArray, moment_sign: float = 1.0) 
 
 
 def reduced_jacobian(limbs: dict[int, Limb]) -> FloatArray:
-    """J_r ``(n, 3, 3)`` of the input-output equation, eq. (19): Klein forms of 1$2 with a translation along each axis."""
+    """J_r ``(n, 3, 3)`` of eq. (19): Klein forms of 1$2 with a translation along each axis."""
     translations = screws.translation(np.eye(3))
     rows = [screws.klein(limbs[i].screws[:, None, LINE_OF_LIMB, :], translations[None]) for i in ACTIVE]
     return np.stack(rows, axis=1)
 
 
 def lie_screw(chain: FloatArray, rates: FloatArray, bodies: int) -> FloatArray:
-    """Lie screw of the first *bodies* screws, ``(n, 6)``: sum over j of [w_j $_j, sum over k > j of w_k $_k]; eq. (23)."""
+    """Lie screw of the first *bodies* screws, ``(n, 6)``: sum of [w_j $_j, sum over k > j of w_k $_k]; eq. (23)."""
     moving = chain * rates[:, :, None]
     total = np.zeros((len(chain), 6))
     for j in range(bodies - 1):
@@ -205,9 +206,7 @@ def torques(
         for body, mass, centre, inertia in bodies:
             tau -= _power_per_rate(moving, number, body, mass, centre, inertia, influence, p.g, np.zeros((1, 3)))
         if number == ACTIVE[0]:
-            tau -= _power_per_rate(
-                moving, number, PLATFORM, p.m6, x, np.zeros(3), influence, p.g, external_force
-            )
+            tau -= _power_per_rate(moving, number, PLATFORM, p.m6, x, np.zeros(3), influence, p.g, external_force)
     return tau
 
 
@@ -245,9 +244,9 @@ def _global_inertia(chain: Limb, inertia: FloatArray) -> FloatArray:
     u = np.broadcast_to(np.array(REVOLUTE_AXES[chain.number]), y.shape)
     x, z = (u, np.cross(u, y)) if chain.number in (1, 3) else (np.cross(y, u), u)
     rotation = np.stack([x, y, z], axis=2)
-    return np.einsum("nik,k,njk->nij", rotation, inertia, rotation)
+    result: FloatArray = (rotation * inertia) @ np.swapaxes(rotation, 1, 2)
+    return result
 
 
 def _solve(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
-    result: FloatArray = np.linalg.solve(matrices, vectors[:, :, None])[:, :, 0]
-    return result
+    return np.asarray(np.linalg.solve(matrices, vectors[:, :, None])[:, :, 0], dtype=np.float64)

@@ -1,8 +1,8 @@
 """Screws of the Lie algebra se(3) as arrays ``(..., 6)``: axis (primary part) first, moment about the pole second.
 
-A velocity state is (omega; velocity of the body's point at the pole). A wrench used with `klein` is (force; moment), so that
-`klein` of a wrench and a velocity state is power. A line along ``u`` through ``A`` has the moment ``A x u`` about the origin.
-Leading dimensions broadcast. Sources: [GarciaMurillo2016] sections 5 and 6 and the works it builds on.
+A velocity state is (omega; velocity of the body's point at the pole). A wrench used with `klein` is (force; moment), so
+that `klein` of a wrench and a velocity state is power. A line along ``u`` through ``A`` has the moment ``A x u`` about
+the origin. Leading dimensions broadcast. Sources: [GarciaMurillo2016] sections 5 and 6 and the works it builds on.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def translation(direction: ArrayLike) -> FloatArray:
 
 
 def klein(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Klein form ``{$1; $2} = s1 . s2O + s1O . s2``, shape ``(...)``; symmetric, invariant, zero for reciprocal screws."""
+    """Klein form ``{$1; $2} = s1 . s2O + s1O . s2``, shape ``(...)``: symmetric, invariant, zero if reciprocal."""
     result: FloatArray = np.sum(first[..., :3] * second[..., 3:] + first[..., 3:] * second[..., :3], axis=-1)
     return result
 
@@ -77,12 +77,12 @@ def adjoint(rotation: ArrayLike, displacement: ArrayLike) -> FloatArray:
 
 
 def span(screws: FloatArray, tolerance: float = 1e-9) -> FloatArray:
-    """Orthonormal basis ``(6, dimension)`` of the space spanned by the rows of ``(k, 6)``, lengths in metres.
+    """Orthonormal basis ``(c, dimension)`` of the space spanned by the rows of ``(k, c)``; screws in metres have c = 6.
 
     Parameters
     ----------
     screws
-        Screws, one a row.
+        Screws, one a row; or the transpose of any matrix, whose column space is wanted.
     tolerance
         Singular values below this fraction of the largest count as zero.
     """
