@@ -1,0 +1,26 @@
+"""Prescribed motions: sinusoids, a pick-and-place cycle, and motions read from a CSV file.
+
+A `JointMotion` is planned in actuated coordinates, a `PlatformMotion` in platform space; whoever knows the mechanism
+turns the second into the first. Nothing here knows a mechanism: workspace limits are checked where they are known.
+"""
+
+from workbench.motion.base import MAX_SAMPLES, Consistency, JointMotion, PlatformMotion, time_grid
+from workbench.motion.cycle import LAWS, PickAndPlace, pick_and_place, time_law
+from workbench.motion.harmonic import Harmonic, multi_sine, sine
+from workbench.motion.table import from_csv
+
+__all__ = [
+    "LAWS",
+    "MAX_SAMPLES",
+    "Consistency",
+    "Harmonic",
+    "JointMotion",
+    "PickAndPlace",
+    "PlatformMotion",
+    "from_csv",
+    "multi_sine",
+    "pick_and_place",
+    "sine",
+    "time_grid",
+    "time_law",
+]
