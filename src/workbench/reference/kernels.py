@@ -238,8 +238,11 @@ def velocities(  # type: ignore[no-untyped-def]
                 a[i, j] = jac[i, passive[j]]
         rank[s] = factor(a, beta, perm)
         solve(a, beta, perm, rank[s], res, x)
-        condition[s] = abs(a[0, 0] / a[p - 1, p - 1]) if rank[s] == p else math.inf
-        weakest[s] = passive[perm[min(rank[s], p - 1)]]
+        if p == 0:  # an open chain: nothing to solve for, and no entry to look at
+            condition[s], weakest[s] = 1.0, actuated[0]
+        else:
+            condition[s] = abs(a[0, 0] / a[p - 1, p - 1]) if rank[s] == p else math.inf
+            weakest[s] = passive[perm[min(rank[s], p - 1)]]
         for j in range(p):
             qvel[s, passive[j]] = x[j]
         for j in range(actuated.shape[0]):
