@@ -386,3 +386,13 @@ def test_rotation_matrices_are_rotations_in_every_direction() -> None:
     assert np.abs(np.linalg.det(rotation) - 1).max() < ROUND_OFF
     assert np.array_equal(rotation[:, :, 2], axes)
     assert np.abs(np.linalg.det(rotation[:, :, [1, 0, 2]]) - 1).min() > 1  # a reflection would be seen
+
+
+def test_det_j_x_vanishes_although_the_arms_are_shorter_than_the_rods() -> None:
+    """[Almeida2010] section 2 says it cannot unless a1 > a2; what counts is whether L - l + a1 reaches a2."""
+    swing = 0.5455
+    edge = math.sqrt(0.3**2 - (0.2 - 0.1 + 0.2 * math.cos(swing)) ** 2)  # 0.129 m, where the rods come in line
+    near, at = (np.array([[edge - distance, swing, swing]]) for distance in (1e-2, 1e-6))
+    mechanism = Asym2rssPpap(table_1())
+    assert mechanism.singularity_measures(near)["det J_x"][0] > 0.1
+    assert mechanism.singularity_measures(at)["det J_x"][0] < 0.01
