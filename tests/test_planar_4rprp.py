@@ -1,0 +1,544 @@
+"""The 4-RPRP robot: two closed forms, a third oracle written here, MuJoCo, and the paper's own numbers.
+
+Every comparison has a twin that is spoiled on purpose and must exceed the tolerance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from workbench.errors import MotionError, ParameterError
+from workbench.mechanisms import planar_4rprp_screws as screw_route
+from workbench.mechanisms import screws
+from workbench.mechanisms.planar_4rprp import HOME_SOLUTION, Planar4Rprp
+from workbench.mechanisms.planar_4rprp_mobility import gogu_mobility, loop_matrix
+from workbench.mechanisms.planar_4rprp_parameters import Parameters
+from workbench.mechanisms.planar_4rprp_singularity import PaperCondition, paper_singularity_conditions, parallelism
+from workbench.mjcf import load_mechanism, load_model
+from workbench.reference.mujoco_reference import MujocoReference
+
+MODEL = str(Path(__file__).resolve().parents[1] / "models" / "planar_4rprp.xml")
+HOME = np.array([0.3893182978, 0.3768866111, 0.3893182978])
+AMPLITUDE = np.array([0.025, -0.030, 0.020])
+
+ROUND_OFF = 1e-10
+"""Peak-normalised, per joint: two forms of the same equations."""
+
+STEP = 1e-3
+DIFFERENCES = 1e-9
+"""Finite differences of sixth order over 1 ms: the remainder and the round-off of positions over the step squared."""
+
+Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def robot() -> Planar4Rprp:
+    mechanism = load_mechanism(MODEL)
+    assert isinstance(mechanism, Planar4Rprp)
+    return mechanism
+
+
+@pytest.fixture(scope="module")
+def reference() -> MujocoReference:
+    return MujocoReference(MODEL)
+
+
+def example(samples: int = 401, speed: float = 1.0) -> Motion:
+    """The numerical example of section 7, `speed` rad/s instead of 1."""
+    time = np.linspace(0.0, 2 * np.pi / speed, samples)[:, None]
+    sine, cosine = np.sin(speed * time), np.cos(speed * time)
+    return HOME + AMPLITUDE * sine, speed * AMPLITUDE * cosine, -(speed**2) * AMPLITUDE * sine
+
+
+def scattered(mechanism: Planar4Rprp, samples: int, seed: int) -> Motion:
+    """Poses all over the workspace with velocities and accelerations that have nothing to do with each other."""
+    rng = np.random.default_rng(seed)
+    p = mechanism.parameters
+    x = np.stack([p.a * rng.uniform(0.2, 0.8, samples), rng.uniform(0.1, 0.4, samples),
+                  p.b * rng.uniform(0.2, 0.8, samples)], axis=1)  # fmt: skip
+    q = mechanism.inverse_kinematics(x)
+    return q, rng.normal(size=q.shape), 30 * rng.normal(size=q.shape)
+
+
+def slow(mechanism: Planar4Rprp, samples: int, seed: int) -> Motion:
+    """As `scattered`, slow enough for finite differences over a few milliseconds."""
+    q, qd, qdd = scattered(mechanism, samples, seed)
+    return q, 0.2 * qd, 0.1 * qdd
+
+
+def random_parameters(seed: int) -> dict[str, float]:
+    rng = np.random.default_rng(seed)
+    defaults = dataclasses.asdict(load_mechanism(MODEL).parameters)
+    changed = {name: defaults[name] * rng.uniform(0.5, 2.0) for name in defaults if name not in ("a", "b", "h", "g")}
+    return changed | {"a": rng.uniform(0.45, 0.8), "b": rng.uniform(0.45, 0.8), "h": rng.uniform(-0.03, 0.06),
+                      "g": rng.uniform(1.0, 15.0)}  # fmt: skip
+
+
+def peak_error(value: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    return np.abs(value - truth).max(axis=0) / np.abs(truth).max(axis=0)
+
+
+# --- kinematics
+
+
+def test_table_2_with_its_signs(robot: Planar4Rprp):
+    printed = 1e-3 * np.array(
+        [[264.86, -248.13, 300], [-264.86, -248.13, 300], [300, 248.13, 300], [-300, 248.13, 300]]
+    )
+    found = robot.forward_kinematics_all(HOME[None])[0]
+    assert np.abs(found - printed).max() < 5e-6
+    np.testing.assert_array_equal(found[HOME_SOLUTION], robot.forward_kinematics(HOME[None])[0])
+    assert np.abs(found - np.abs(printed)).max() > 5e-6  # without the signs that the scan lost
+
+
+def test_all_four_solutions_have_the_same_limb_lengths(robot: Planar4Rprp):
+    q, _, _ = scattered(robot, 50, 1)
+    p = robot.parameters
+    x = robot.forward_kinematics_all(q)
+    real = ~np.isnan(x[..., 0])
+    assert real[:, 2:].all()
+    lengths = np.stack([np.hypot(x[..., 1], x[..., 2]), np.hypot(x[..., 0], x[..., 1] - p.h),
+                        np.hypot(x[..., 1], p.b - x[..., 2])], axis=-1)  # fmt: skip
+    np.testing.assert_allclose(lengths[real], np.broadcast_to(q[:, None], x.shape)[real], atol=1e-14)
+
+
+def test_a_solution_that_is_not_real_is_nan(robot: Planar4Rprp):
+    # limb 2 long enough for the upper solutions, too short for the lower ones
+    q = robot.inverse_kinematics([[0.01, 0.25, 0.3]])
+    found = robot.forward_kinematics_all(q)[0]
+    assert np.isnan(found[:2]).all()
+    assert np.isfinite(found[2:]).all()
+
+
+def test_inverse_kinematics_undoes_forward_kinematics(robot: Planar4Rprp):
+    q, _, _ = scattered(robot, 100, 2)
+    np.testing.assert_allclose(robot.inverse_kinematics(robot.forward_kinematics(q)), q, atol=1e-14)
+
+
+def test_platform_motion_by_finite_differences(robot: Planar4Rprp):
+    q, qd, qdd = slow(robot, 40, 3)
+    x, xd, xdd = robot.platform_motion(q, qd, qdd)
+    along = _along(robot.forward_kinematics, q, qd, qdd)
+    assert (peak_error(_first(along), xd) < DIFFERENCES).all()
+    assert (peak_error(_second(along), xdd) < DIFFERENCES).all()
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", robot.jacobian(q), qd), xd, atol=1e-12)
+    still = robot.platform_motion(q, 0 * qd, qdd)[2]  # twin: without the velocity products
+    assert (peak_error(still, xdd) > 1e-3).any()
+    back = robot.joint_motion(x, xd, xdd)
+    for found, expected in zip(back, (q, qd, qdd), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-11)
+
+
+def test_reduced_jacobian_inverts_the_jacobian_and_has_the_determinant_stated(robot: Planar4Rprp):
+    q, _, _ = scattered(robot, 60, 4)
+    rows = robot.reduced_jacobian(q)
+    np.testing.assert_allclose(rows @ robot.jacobian(q), np.broadcast_to(np.eye(3), rows.shape), atol=1e-13)
+    np.testing.assert_allclose(np.linalg.norm(rows, axis=2), 1.0, atol=1e-14)
+    x = robot.forward_kinematics(q)
+    stated = robot.parameters.b * x[:, 0] * x[:, 1] / np.prod(q, axis=1)
+    np.testing.assert_allclose(np.linalg.det(rows), stated, atol=1e-14)
+    np.testing.assert_allclose(robot.singularity_measures(q)["det J_r"], stated, atol=1e-15)
+    assert np.abs(np.linalg.det(rows) - stated * x[:, 2] / x[:, 1]).max() > 1e-3
+
+
+# --- dynamics against an oracle written here
+
+
+def _along(function: Callable[[np.ndarray], np.ndarray], q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+    """`function` at seven times around each sample, ``(7, n, ...)``."""
+    times = STEP * np.arange(-3, 4)
+    return np.stack([function(q + t * qd + 0.5 * t**2 * qdd) for t in times])
+
+
+def _first(values: np.ndarray) -> np.ndarray:
+    return np.tensordot([-1, 9, -45, 0, 45, -9, 1], values, axes=1) / (60 * STEP)
+
+
+def _second(values: np.ndarray) -> np.ndarray:
+    return np.tensordot([2, -27, 270, -490, 270, -27, 2], values, axes=1) / (180 * STEP**2)
+
+
+@dataclasses.dataclass(frozen=True)
+class Spoil:
+    """What to do wrong in the oracle."""
+
+    limbs: tuple[int, ...] = (1, 2, 3, 4)
+    rods: float = 1.0
+    force: float = 1.0
+    gravity: float = 1.0
+    piston_from_pivot: bool = False
+    swapped_inertia: bool = False
+
+
+NOTHING = Spoil()
+
+
+def oracle(p: Parameters, motion: Motion, force: np.ndarray, spoil: Spoil = NOTHING) -> np.ndarray:
+    """D'Alembert for eleven bodies; accelerations and partial derivatives by finite differences of positions.
+
+    Positions come from eq. (14)-(16); nothing is shared with the package.
+    """
+
+    def bodies(q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        z = (p.b**2 + q[:, 0] ** 2 - q[:, 2] ** 2) / (2 * p.b)
+        y = np.sqrt(q[:, 0] ** 2 - z**2)
+        x = np.sqrt(q[:, 1] ** 2 - (y - p.h) ** 2)
+        platform = np.stack([x, y, z], axis=1)
+        pivots = {1: (0, 0, 0), 2: (0, 0, p.b), 3: (p.a, 0, p.b), 4: (p.a, 0, 0)}
+        centres, masses, angles, inertias = [platform], [p.m6], [0 * x], [0.0]
+        for number in spoil.limbs:
+            pivot = np.array(pivots[number], dtype=float)
+            plane = 2 if number in (1, 3) else 0
+            arm = np.zeros_like(platform)
+            arm[:, plane] = platform[:, plane] - pivot[plane]
+            arm[:, 1] = y if plane == 2 else y - p.h
+            length = np.linalg.norm(arm, axis=1, keepdims=True)
+            angle = np.arctan2(arm[:, plane], arm[:, 1])
+            about_x = (number in (1, 3)) != spoil.swapped_inertia
+            centres += [pivot + p.c2 * arm / length,
+                        pivot + arm * (p.c3 / length if spoil.piston_from_pivot else 1 - p.c3 / length)]  # fmt: skip
+            masses += [p.m2, p.m3]
+            angles += [angle, angle]
+            inertias += [p.I2x, p.I3x] if about_x else [p.I2z, p.I3z]
+        centres += [platform * [0, 1, 1], platform * [1, 1, 0]]
+        masses += [spoil.rods * p.m4] * 2
+        angles += [0 * x] * 2
+        inertias += [0.0] * 2
+        return np.stack(centres, 1), np.stack(angles, 1), np.array(masses), np.array(inertias)
+
+    q, qd, qdd = motion
+    _, _, masses, inertias = bodies(q)
+    down = np.array([0.0, -p.g * spoil.gravity, 0.0])
+    needed = masses[:, None] * (_second(_along(lambda s: bodies(s)[0], q, qd, qdd)) - down)
+    needed[:, 0] -= spoil.force * force
+    moments = inertias * _second(_along(lambda s: bodies(s)[1], q, qd, qdd))
+    tau = np.empty_like(q)
+    for joint in range(3):
+        unit = np.zeros_like(q)
+        unit[:, joint] = 0.2  # slow, as the motions
+        moved = _first(_along(lambda s: bodies(s)[0], q, unit, 0 * unit)) / 0.2
+        turned = _first(_along(lambda s: bodies(s)[1], q, unit, 0 * unit)) / 0.2
+        tau[:, joint] = np.sum(needed * moved, axis=(1, 2)) + np.sum(moments * turned, axis=1)
+    return tau
+
+
+SPOILED = {
+    "limb 4 omitted": Spoil(limbs=(1, 2, 3)),
+    "one body 4 per limb": Spoil(rods=2.0),
+    "force reversed": Spoil(force=-1.0),
+    "gravity upwards": Spoil(gravity=-1.0),
+    "c3 measured from A": Spoil(piston_from_pivot=True),
+    "I_x and I_z exchanged": Spoil(swapped_inertia=True),
+}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_torques_by_finite_differences_of_positions(robot: Planar4Rprp, seed: int):
+    mechanism = robot.with_parameters(**random_parameters(seed)) if seed else robot
+    motion = slow(mechanism, 30, seed)
+    force = np.array([40.0, -100.0, 70.0])
+    tau = mechanism.inverse_dynamics(*motion, external_force=force)
+    assert (peak_error(tau, oracle(mechanism.parameters, motion, force)) < DIFFERENCES).all()
+
+
+@pytest.mark.parametrize("spoil", SPOILED.values(), ids=SPOILED.keys())
+def test_the_oracle_sees_what_is_spoiled(robot: Planar4Rprp, spoil: Spoil):
+    motion = slow(robot, 30, 0)
+    force = np.array([40.0, -100.0, 70.0])
+    tau = robot.inverse_dynamics(*motion, external_force=force)
+    assert (peak_error(tau, oracle(robot.parameters, motion, force, spoil)) > 1e-5).any()
+
+
+def test_lumped_masses_are_bars_without_rotational_inertia(robot: Planar4Rprp):
+    motion = example(101, speed=10.0)
+    p = dataclasses.replace(robot.parameters, I2x=0.0, I2z=0.0, I3x=0.0, I3z=0.0)
+    lumped = robot.inverse_dynamics(*motion, mass_model="lumped")
+    assert (peak_error(lumped, oracle(p, motion, np.zeros(3))) < 1e-6).all()
+    assert (peak_error(robot.inverse_dynamics(*motion), lumped) > 1e-2).all()
+
+
+def test_power_balance(robot: Planar4Rprp, reference: MujocoReference):
+    """tau . qd + f . xd = dE/dt, with MuJoCo's energy along a smooth motion."""
+    time = np.linspace(0.0, 0.4, 4001)
+    q, qd, qdd = (np.squeeze(part) for part in _sines(time))
+    force = np.array([30.0, -50.0, 20.0])
+    tau = robot.inverse_dynamics(q, qd, qdd, external_force=force)
+    xd = robot.platform_motion(q, qd, qdd)[1]
+    power = np.sum(tau * qd, axis=1) + xd @ force
+    energy = reference.inverse_dynamics(q, qd, qdd).energy.sum(axis=1)
+    step = time[1] - time[0]
+    rate = (energy[:-4] - 8 * energy[1:-3] + 8 * energy[3:-1] - energy[4:]) / (12 * step)
+    scale = np.abs(rate).max()
+    assert np.abs(power[2:-2] - rate).max() < 1e-8 * scale
+    assert np.abs(power[2:-2] - 2 * (xd @ force)[2:-2] - rate).max() > 1e-2 * scale  # force reversed
+
+
+def _sines(time: np.ndarray) -> Motion:
+    """Two sines per joint at 5 to 15 rad/s."""
+    slow, fast, phase = np.array([5.0, 7.0, 6.0]), np.array([13.0, 11.0, 15.0]), np.array([0.0, 1.0, 2.0])
+    size = np.array([0.02, 0.025, 0.015])
+    a, b = slow * time[:, None] + phase, fast * time[:, None]
+    q = HOME + size * (np.sin(a) + 0.5 * np.cos(b))
+    qd = size * (slow * np.cos(a) - 0.5 * fast * np.sin(b))
+    return q, qd, -size * (slow**2 * np.sin(a) + 0.5 * fast**2 * np.cos(b))
+
+
+# --- dynamics against MuJoCo
+
+
+@pytest.mark.parametrize("seed", range(100, 124))
+def test_random_parameters_and_forces_against_mujoco(seed: int):
+    changes = random_parameters(seed)
+    mechanism = load_mechanism(MODEL, **changes)
+    engine = MujocoReference(MODEL, **changes)
+    motion = scattered(mechanism, 12, seed)
+    force = 300 * np.random.default_rng(seed).normal(size=(12, 3))
+    for mass_model in ("distributed", "lumped"):
+        result = engine.inverse_dynamics(*motion, mass_model=mass_model, external_force=force)
+        tau = mechanism.inverse_dynamics(*motion, mass_model=mass_model, external_force=force)
+        assert (peak_error(tau, result.tau) < ROUND_OFF).all()
+    for found, expected in zip(mechanism.platform_motion(*motion), (result.x, result.xd, result.xdd), strict=True):
+        assert (peak_error(found, expected) < 1e-11).all()
+    spoiled = mechanism.with_parameters(c2=changes["c2"] * (1 + 1e-6), I2x=changes["I2x"], I2z=changes["I2z"])
+    assert (peak_error(spoiled.inverse_dynamics(*motion, mass_model="lumped", external_force=force), result.tau)
+            > ROUND_OFF).any()  # fmt: skip
+
+
+@pytest.mark.parametrize("force", [None, (0.0, -1000.0, 0.0), (0.0, 1000.0, 0.0)])
+def test_the_papers_example_against_mujoco(robot: Planar4Rprp, reference: MujocoReference, force):
+    motion = example(101)
+    truth = reference.inverse_dynamics(*motion, external_force=force).tau
+    for name in ("distributed", "screws"):
+        given = np.broadcast_to(np.zeros(3) if force is None else force, truth.shape)
+        assert (peak_error(robot.candidates[name].function(robot, *motion, given), truth) < ROUND_OFF).all()
+
+
+def test_forces_of_the_papers_example(robot: Planar4Rprp):
+    """Ranges in newtons that the assumptions written in the model lead to."""
+    motion = example(2001)
+
+    def ranges(force: float) -> np.ndarray:
+        tau = robot.inverse_dynamics(*motion, external_force=(0.0, force, 0.0))
+        return np.stack([tau.min(axis=0), tau.max(axis=0)], axis=1)
+
+    free = [[11.859, 14.805], [-0.0735, 0.1317], [11.985, 14.711]]
+    np.testing.assert_allclose(ranges(0.0), free, atol=6e-4)
+    loaded = ranges(-1000.0)
+    np.testing.assert_allclose(loaded[[0, 2]], [[737.8, 886.6], [745.7, 880.6]], atol=0.06)
+    np.testing.assert_allclose(loaded[1], free[1], atol=6e-4)  # tau2 does not feel the force
+
+
+# --- the paper's own route
+
+
+def test_screws_agree_with_the_direct_form(robot: Planar4Rprp):
+    for seed in range(20):
+        mechanism = robot.with_parameters(**random_parameters(seed))
+        q, qd, qdd = scattered(mechanism, 20, seed)
+        force = 300 * np.random.default_rng(seed).normal(size=q.shape)
+        direct = {m: mechanism.inverse_dynamics(q, qd, qdd, m, force) for m in ("distributed", "lumped")}
+        x = mechanism.forward_kinematics(q)
+        for model, tau in direct.items():
+            found = screw_route.torques(mechanism.parameters, q, qd, qdd, x, force, model)
+            assert (peak_error(found, tau) < ROUND_OFF).all()
+        printed = mechanism.candidates["screws-as-printed"].function(mechanism, q, qd, qdd, force)
+        assert (peak_error(printed, direct["distributed"]) > 1e-3).all()
+
+
+def test_the_virtual_line_is_reciprocal_to_all_but_the_actuator(robot: Planar4Rprp):
+    x = robot.forward_kinematics(scattered(robot, 10, 5)[0])
+    for number in (1, 2, 3, 4):
+        chain = screw_route.limb(robot.parameters, number, x).screws
+        form = screws.klein(chain[:, screw_route.LINE_OF_LIMB, None], chain)
+        np.testing.assert_allclose(form, np.broadcast_to([0, 0, 0, 1, 0, 0], form.shape), atol=1e-15)
+
+
+def test_accelerations_by_lie_screws_and_the_lost_sign(robot: Planar4Rprp):
+    q, qd, qdd = scattered(robot, 30, 6)
+    x, xd, xdd = robot.platform_motion(q, qd, qdd)
+    right = screw_route.motion(robot.parameters, qd, qdd, x)
+    np.testing.assert_allclose(right.jacobian_r, robot.reduced_jacobian(q), atol=1e-15)
+    np.testing.assert_allclose(right.xd, xd, atol=1e-12)
+    assert (peak_error(right.xdd, xdd) < 1e-12).all()
+    for rates in right.rates.values():
+        np.testing.assert_allclose(rates[:, 1:3], 0.0, atol=1e-13)  # the virtual joints stand still
+    printed = screw_route.motion(robot.parameters, qd, qdd, x, moment_sign=-1.0)
+    np.testing.assert_allclose(printed.xd, xd, atol=1e-12)  # velocities do not show it
+    assert (peak_error(printed.xdd, xdd) > 1e-2).any()
+    # what changes sign is the Lie-screw term: driver - qdd
+    lie = [np.einsum("nij,nj->ni", m.jacobian_r, m.xdd) - qdd for m in (right, printed)]
+    np.testing.assert_allclose(lie[0], -lie[1], atol=1e-11)
+
+
+# --- mobility and singular poses
+
+
+def test_mobility_by_gogus_count_and_by_rank(robot: Planar4Rprp, reference: MujocoReference):
+    count = gogu_mobility(robot.parameters)
+    assert (count.p, count.r, count.mobility) == (14, 11, 3)
+    assert (count.limb_connectivity, count.rod_connectivity) == (((3, 3), (3, 3)), (3, 3))
+    assert (count.loop_connectivity, count.lost_in_loops, count.platform_connectivity) == ((4, 4), (3, 3), 3)
+    assert (count.loop_rows, count.loop_rank) == (18, 11)
+    by_rank = reference.mobility()
+    assert (by_rank.joint_freedoms, by_rank.rank, by_rank.mobility, by_rank.idle_freedoms) == (14, 11, 3, 0)
+
+
+def test_a_tilted_axis_changes_the_rank(robot: Planar4Rprp):
+    matrix = loop_matrix(robot.parameters, [[0.25, 0.22, 0.35]])
+    assert np.linalg.matrix_rank(matrix, tol=1e-9) == 11
+    tilted = matrix.copy()
+    tilted[[0, 1, 2], -1] += tilted[[6, 7, 8], -1]
+    tilted[7, -1] += 0.1  # the last revolute no longer parallel to its partner
+    assert np.linalg.matrix_rank(tilted, tol=1e-9) > 11
+
+
+def _held(conditions: tuple[PaperCondition, ...]) -> dict[str, bool]:
+    return {condition.name: condition.holds for condition in conditions}
+
+
+def test_figure_7_is_no_singular_pose(robot: Planar4Rprp):
+    q = robot.inverse_kinematics([[0.3, robot.parameters.h, 0.3]])  # Py = h: limbs 2 and 4 in line
+    assert parallelism(robot, q)[0] < 1e-12
+    assert not _held(paper_singularity_conditions(robot, q))["w2 not parallel to w4 (Figure 7): |w2 x w4| > 0"]
+    assert robot.singularity_measures(q)["det J_r"][0] == pytest.approx(0.1327, abs=1e-4)
+    assert np.isfinite(robot.inverse_dynamics(q, 0 * q, 0 * q)).all()
+
+
+def test_the_papers_conditions_are_not_necessary(robot: Planar4Rprp):
+    # from one side to the other at a constant height; and a pose beyond A1
+    z = np.linspace(0.1, 0.5, 41)
+    across = robot.inverse_kinematics(np.stack([0 * z + 0.3, 0 * z + 0.15, z], axis=1))
+    assert robot.singularity_measures(across)["det J_r"].min() > 0.5
+    assert not _held(paper_singularity_conditions(robot, across))["min q1 + min q3 > b"]
+    beyond = robot.inverse_kinematics([[0.3, 0.1, -0.1]])
+    assert robot.singularity_measures(beyond)["det J_r"][0] > 0.5
+    assert not _held(paper_singularity_conditions(robot, beyond))["max q3 < sqrt(min q1^2 + b^2)"]
+
+
+def test_the_papers_printed_conditions_are_not_sufficient(robot: Planar4Rprp):
+    q = robot.inverse_kinematics([[1e-9, 0.25, 0.3]])
+    with pytest.raises(MotionError, match="det J_r"):
+        robot.forward_kinematics(q)
+    measures = robot.singularity_measures(q)
+    assert measures["det J_r"][0] < 1e-6
+    assert robot.condition_number(q)[0] > 1e6
+    q1, _, q3 = q[0]
+    b = robot.parameters.b
+    assert q1 + q3 > b
+    assert q3 < np.hypot(q1, b)
+
+
+def test_condition_number_is_that_of_the_rows(robot: Planar4Rprp):
+    q, _, _ = scattered(robot, 10, 7)
+    values = np.linalg.svd(robot.reduced_jacobian(q), compute_uv=False)
+    np.testing.assert_allclose(robot.condition_number(q), values[:, 0] / values[:, -1], rtol=1e-12)
+
+
+# --- refusals
+
+
+@pytest.mark.parametrize(
+    ("q", "joint"),
+    [
+        ((0.2, 0.37, 0.3), "q1, q3"),
+        ((0.39, 0.1, 0.39), "q2"),
+        ((0.39, -0.37, 0.39), "q2"),
+        ((0.0, 0.37, 0.39), "q1"),
+        ((0.3, 0.37, 0.3), "q1, q2, q3"),
+    ],
+)
+def test_bad_poses_are_refused_by_sample_and_joint(robot: Planar4Rprp, q: tuple[float, ...], joint: str):
+    batch = np.stack([HOME, HOME, np.array(q)])
+    for call in (robot.forward_kinematics, robot.jacobian, lambda s: robot.inverse_dynamics(s, 0 * s, 0 * s)):
+        with pytest.raises(MotionError) as caught:
+            call(batch)
+        assert (caught.value.facts["sample"], caught.value.facts["joint"]) == (2, joint)
+        assert "\n" not in str(caught.value)
+
+
+def test_positions_off_the_home_branch_are_refused(robot: Planar4Rprp):
+    for x, words in (((-0.3, 0.25, 0.3), "Px > 0"), ((0.3, -0.25, 0.3), "Py > 0"), ((0.6, 0.02, 0.3), "limb 4")):
+        with pytest.raises(MotionError, match=words):
+            robot.inverse_kinematics([x])
+
+
+def test_parameters_are_checked(robot: Planar4Rprp):
+    for changes in ({"b": 0.0}, {"m2": -1.0}, {"payload": 1.0}, {"I2x": 0.0}):
+        with pytest.raises(ParameterError, match=next(iter(changes))):
+            robot.with_parameters(**changes)
+
+
+def test_a_bar_stays_uniform_unless_its_inertia_is_given(robot: Planar4Rprp):
+    p = robot.with_parameters(m2=0.5).parameters
+    assert p.I2x == p.I2z == pytest.approx(0.5 * (2 * p.c2) ** 2 / 12, rel=1e-15)
+    assert (p.I3x, p.I3z) == (robot.parameters.I3x, robot.parameters.I3z)
+    p = robot.with_parameters(c3=0.1).parameters
+    assert p.I3x == p.I3z == pytest.approx(0.155 * 0.2**2 / 12, rel=1e-15)
+    p = robot.with_parameters(m2=0.5, I2x=0.003, I2z=0.002).parameters
+    assert (p.I2x, p.I2z) == (0.003, 0.002)
+
+
+# --- the model
+
+
+def test_table_3_and_the_assumptions_stand_in_the_model(robot: Planar4Rprp):
+    p = robot.parameters
+    assert (p.a, p.b, p.h, p.g) == (0.6, 0.6, 0.02, 9.81)
+    assert (p.m2, p.m3, p.m4, p.m6) == (0.357, 0.155, 0.339, 0.212)
+    assert (p.I2x, p.I2z, p.I3x, p.I3z) == (2443.907e-6, 2410.1092e-6, 1022.324e-6, 1021.984e-6)
+    # c2, c3: uniform bars with the first entry of Table 3
+    assert p.m2 * p.c2**2 / 3 == pytest.approx(p.I2x, rel=1e-5)
+    assert p.m3 * p.c3**2 / 3 == pytest.approx(p.I3x, rel=1e-5)
+
+
+def test_parameters_come_back_from_the_compiled_model_bit_for_bit():
+    for seed in range(5):
+        changes = random_parameters(seed)
+        found = dataclasses.asdict(load_mechanism(MODEL, **changes).parameters)
+        assert found == changes
+
+
+def test_the_model_is_closed_at_home_and_simulates_without_warnings():
+    model = load_model(MODEL).model
+    data = mujoco.MjData(model)
+    np.testing.assert_array_equal(model.key_qpos[0], model.qpos0)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    assert np.abs(data.efc_pos).max() < 1e-15
+    assert data.nefc == 18
+    # world z up, paper y up: (x, y, z) of the paper is (x, -z, y) of the world
+    height = np.sqrt(HOME[0] ** 2 - 0.09)
+    np.testing.assert_allclose(data.site("P").xpos, [0.3, -0.3, height], atol=1e-10)
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+    assert not any(warning.number for warning in data.warning)
+    assert np.abs(data.efc_pos).max() < 1e-4
+    assert data.site("P").xpos[2] < 0.0  # nothing holds it: it falls along its freedoms
+
+
+def test_everything_in_the_model_is_named_and_weighs():
+    model = load_model(MODEL).model
+    obj = mujoco.mjtObj
+    kinds = {
+        obj.mjOBJ_BODY: model.nbody,
+        obj.mjOBJ_JOINT: model.njnt,
+        obj.mjOBJ_GEOM: model.ngeom,
+        obj.mjOBJ_SITE: model.nsite,
+        obj.mjOBJ_EQUALITY: model.neq,
+        obj.mjOBJ_ACTUATOR: model.nu,
+    }
+    for kind, count in kinds.items():
+        assert all(mujoco.mj_id2name(model, kind, index) for index in range(count))
+    assert model.body_mass[1:].min() > 0.1
+    assert not np.any(model.geom_contype | model.geom_conaffinity)
+    for passive in (model.dof_damping, model.dof_armature, model.dof_frictionloss):
+        assert not np.any(passive)
+    moving = model.body_mass[2:].sum()
+    p = load_mechanism(MODEL).parameters
+    assert moving == pytest.approx(4 * (p.m2 + p.m3) + 2 * p.m4 + p.m6, rel=1e-15)
