@@ -17,8 +17,9 @@ from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.errors import MotionError, ParameterError
 from workbench.mechanisms import asym_2rss_ppap_kernel as kernel
 from workbench.mechanisms import asym_2rss_ppap_literal as literal
-from workbench.mechanisms.asym_2rss_ppap_parameters import PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
+from workbench.mechanisms.asym_2rss_ppap_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
 from workbench.mechanisms.base import Candidate, Mechanism, ParameterInfo, Target, UniformRule
+from workbench.mechanisms.layout import Layout
 
 SINGULAR = 1e-6
 """A pose counts as singular when a determinant, divided by the lengths it is made of, is below this: torques there are
@@ -41,6 +42,7 @@ class Asym2rssPpap(Mechanism):
     parameter_table: ClassVar[tuple[ParameterInfo, ...]] = PARAMETERS
     targets: ClassVar[tuple[Target, ...]] = TARGETS
     uniform_rules: ClassVar[tuple[UniformRule, ...]] = UNIFORM_RULES
+    layout: ClassVar[Layout] = LAYOUT
     parameter_type: ClassVar[type] = Parameters
 
     def __init__(self, parameters: Any) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from workbench.errors import ParameterError
 from workbench.mechanisms.base import SIDES, ParameterInfo, Target, UniformRule
+from workbench.mechanisms.layout import BodyInfo, Layout, LoopInfo, X, Z
 
 TABLE_1 = "[Almeida2010] Table 1"
 UNIFORM = "uniform slender bar"
@@ -198,4 +199,37 @@ UNIFORM_RULES: tuple[UniformRule, ...] = (
     *(_uniform(f"m1_{side}", f"a1_{side}", f"I1_{side}", f"k1_{side}") for side in SIDES),
     *(_uniform(f"m2_{side}", f"a2_{side}", f"I2_{side}", f"k2_{side}") for side in SIDES),
     _uniform("m5", "a5", "I5", "k5"),
+)
+
+LAYOUT = Layout(
+    base="base",
+    gravity=Z,
+    bodies=(
+        BodyInfo("slider", "base", "q1", "slide", X, turns=False),
+        BodyInfo("parallelogram_bar_1", "slider", "parallelogram_hinge_1", "hinge", X),
+        BodyInfo("parallelogram_bar_2", "slider", "parallelogram_hinge_2", "hinge", X),
+        BodyInfo("coupler", "parallelogram_bar_1", "coupler_hinge", "hinge", X, turns=False),
+        BodyInfo("platform", "coupler", "platform_slide", "slide", Z, turns=False),
+        BodyInfo("payload", "platform", turns=False),
+        BodyInfo("arm_left", "base", "q2", "hinge", (-1.0, 0.0, 0.0)),
+        BodyInfo("arm_right", "base", "q3", "hinge", X),
+        BodyInfo("rod_left", "arm_left", "spherical_C", "ball"),
+        BodyInfo("rod_right", "arm_right", "spherical_D", "ball"),
+    ),
+    loops=(
+        LoopInfo("connect", ("rod_left_tip", "platform_E")),
+        LoopInfo("connect", ("rod_right_tip", "platform_F")),
+        LoopInfo("connect", ("parallelogram_bar_2_tip", "coupler_joint_2")),
+    ),
+    sites={
+        "platform": "platform",
+        "platform_E": "platform",
+        "platform_F": "platform",
+        "rod_left_tip": "rod_left",
+        "rod_right_tip": "rod_right",
+        "parallelogram_bar_2_tip": "parallelogram_bar_2",
+        "coupler_joint_2": "coupler",
+    },
+    platform_site="platform",
+    lumped_bodies=("arm_left", "arm_right", "rod_left", "rod_right", "parallelogram_bar_1", "parallelogram_bar_2"),
 )

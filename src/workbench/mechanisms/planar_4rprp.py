@@ -17,7 +17,8 @@ from workbench.errors import MotionError
 from workbench.mechanisms import planar_4rprp_kernel as kernel
 from workbench.mechanisms import planar_4rprp_screws as screw_route
 from workbench.mechanisms.base import Candidate, Mechanism, ParameterInfo, Target, UniformRule
-from workbench.mechanisms.planar_4rprp_parameters import PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
+from workbench.mechanisms.layout import Layout
+from workbench.mechanisms.planar_4rprp_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
 
 SINGULAR = 1e-6
 """A pose counts as singular when a measure is below this: forces there are a million times those that cause them."""
@@ -40,6 +41,7 @@ class Planar4Rprp(Mechanism):
     parameter_table: ClassVar[tuple[ParameterInfo, ...]] = PARAMETERS
     targets: ClassVar[tuple[Target, ...]] = TARGETS
     uniform_rules: ClassVar[tuple[UniformRule, ...]] = UNIFORM_RULES
+    layout: ClassVar[Layout] = LAYOUT
     parameter_type: ClassVar[type] = Parameters
 
     def __init__(self, parameters: Any) -> None:
