@@ -12,12 +12,13 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from workbench._version import __version__
+
 if TYPE_CHECKING:
     from workbench.errors import WorkbenchError
     from workbench.mjcf import load_mechanism
     from workbench.reference import MujocoReference
 
-__version__ = "0.1.0"
 __all__ = ["MujocoReference", "WorkbenchError", "__version__", "load_mechanism"]
 
 _HOMES = {

@@ -21,6 +21,12 @@ from workbench.errors import ParameterError, did_you_mean
 
 SIDES = ("left", "right")
 
+NEAR_SINGULAR = 0.05
+"""A pose is worth a warning when a scaled determinant is below this: a factor of twenty between forces and torques."""
+
+LONGEST_LINK = 20.0
+"""Metres; no parallel robot of this kind has a longer link, so a longer one was written in millimetres."""
+
 
 @dataclass(frozen=True)
 class ParameterInfo:
@@ -72,7 +78,7 @@ class Target:
 class UniformRule:
     """Changing a parameter in ``when`` sets those in ``sets``, unless they (or one in ``unless``) are given too.
 
-    This is the promise of DESIGN section 2: a bar whose mass or length changes stays a uniform slender bar.
+    A bar whose mass or length changes stays a uniform slender bar.
     """
 
     when: tuple[str, ...]
@@ -178,6 +184,31 @@ class Mechanism(ABC):
     @abstractmethod
     def singularity_measures(self, q: ArrayLike) -> dict[str, FloatArray]:
         """Determinants that vanish at singular poses, name -> ``(n,)``, scaled to be dimensionless (1 is far away)."""
+
+    def warnings(self, t: FloatArray, q: FloatArray) -> list[str]:
+        """What a reader of a case's results should know: poses near a singularity, lengths that look like millimetres.
+
+        Parameters
+        ----------
+        t, q
+            Times ``(n,)`` in seconds and actuated coordinates ``(n, na)``.
+        """
+        found = []
+        for name, values in self.singularity_measures(q).items():
+            worst = int(np.argmin(np.abs(values)))
+            if abs(values[worst]) < NEAR_SINGULAR:
+                found.append(
+                    f"close to a singular pose at t = {t[worst]:.6g} s: |{name}| falls to {abs(values[worst]):.3g} of its"
+                    f" scale (warning below {NEAR_SINGULAR:g})"
+                )
+        for name, info in stored_names(self.parameter_table).items():
+            value = getattr(self._parameters, name)
+            if info.unit == "m" and abs(value) > LONGEST_LINK:
+                found.append(
+                    f"{name} = {value:g} m is longer than {LONGEST_LINK:g} m: lengths are in metres, this looks like"
+                    " millimetres"
+                )
+        return found
 
     @abstractmethod
     def torques(
@@ -294,9 +325,8 @@ def changed_parameters(
         Unknown name, or a value out of range.
     """
     given = expand_names(mechanism.parameter_table, changes)
-    check_known = {**values, **given}
-    check_parameters(mechanism.parameter_table, check_known)
-    result = dict(check_known)
+    result = {**values, **given}
+    check_parameters(mechanism.parameter_table, result)
     for rule in mechanism.uniform_rules:
         moved = any(name in given and given[name] != values[name] for name in rule.when)
         if not moved or any(name in given for name in rule.unless):

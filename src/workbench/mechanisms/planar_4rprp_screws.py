@@ -107,7 +107,7 @@ def reduced_jacobian(limbs: dict[int, Limb]) -> FloatArray:
 
 
 def lie_screw(chain: FloatArray, rates: FloatArray, bodies: int) -> FloatArray:
-    """Lie screw of the first *bodies* screws, ``(n, 6)``: sum of [w_j $_j, sum over k > j of w_k $_k]; eq. (23)."""
+    """Lie screw of the first *bodies* screws, ``(n, 6)``: sum of [w_j $_j, sum over k > j of w_k $_k]; section 5."""
     moving = chain * rates[:, :, None]
     total = np.zeros((len(chain), 6))
     for j in range(bodies - 1):
@@ -132,7 +132,7 @@ class Motion:
 
 
 def motion(parameters: Any, qd: FloatArray, qdd: FloatArray, x: FloatArray, moment_sign: float = 1.0) -> Motion:
-    """Velocity and acceleration of P and of every joint; [GarciaMurillo2016] eq. (17)-(23).
+    """Velocity and acceleration of P and of every joint; [GarciaMurillo2016] section 5, eq. (17) and after.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def torques(
     mass_model: str = "distributed",
     moment_sign: float = 1.0,
 ) -> FloatArray:
-    """Driving forces tau ``(n, 3)`` in newtons by partial screws and virtual work; [GarciaMurillo2016] eq. (24)-(32).
+    """Driving forces tau ``(n, 3)`` in newtons by partial screws and virtual work; [GarciaMurillo2016] section 6, to eq. (32).
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def _power_per_rate(
     g: float,
     force: FloatArray,
 ) -> FloatArray:
-    """Klein form of one body's wrench with its three partial screws, ``(n, 3)``; eq. (24), (25), (29), (31)."""
+    """Klein form of one body's wrench with its three partial screws, ``(n, 3)``; eq. (25), (29), (31)."""
     chain, rates = moving.limbs[number], moving.rates[number]
     screws_below = chain.screws[:, :body]
     velocity = screws.change_pole(np.einsum("nk,nkc->nc", rates[:, :body], screws_below), centre)
@@ -239,7 +239,7 @@ def _power_per_rate(
 
 
 def _global_inertia(chain: Limb, inertia: FloatArray) -> FloatArray:
-    """I0 = R I* R^T, ``(n, 3, 3)``, eq. (24): body frames have y along the limb, x or z along the revolute axis."""
+    """I0 = R I* R^T, ``(n, 3, 3)``, section 6: body frames have y along the limb, x or z along the revolute axis."""
     y = chain.direction
     u = np.broadcast_to(np.array(REVOLUTE_AXES[chain.number]), y.shape)
     x, z = (u, np.cross(u, y)) if chain.number in (1, 3) else (np.cross(y, u), u)

@@ -1,0 +1,193 @@
+"""From a campaign to cases that can be computed: every name resolved, every motion in joint space and in reach."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from workbench.arrays import FloatArray
+from workbench.campaign.spec import Campaign, CaseSpec, CsvMotion, CycleMotion, MultiSineMotion, SineMotion
+from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
+from workbench.mechanisms.base import Mechanism
+from workbench.mjcf import find_model, load_model
+from workbench.motion import JointMotion, PlatformMotion, from_csv, multi_sine, pick_and_place, sine, time_grid
+
+
+@dataclass(frozen=True)
+class Case:
+    """One robot on one motion, ready to compute."""
+
+    spec: CaseSpec
+    model: Path
+    overrides: dict[str, float]
+    mechanism: Mechanism
+    motion: JointMotion = field(repr=False)
+    force: FloatArray = field(repr=False)
+    x: FloatArray = field(repr=False)
+    xd: FloatArray = field(repr=False)
+    xdd: FloatArray = field(repr=False)
+    """platform motion by the closed form, ``(n, 3)``"""
+
+    @property
+    def name(self) -> str:
+        """The case's name, which is also its file's."""
+        return self.spec.name
+
+
+def resolve_cases(
+    campaign: Campaign, file: Path, model: Path | None = None, only: tuple[str, ...] = (), settings: Mapping[str, float] | None = None
+) -> list[Case]:
+    """Resolve every case: parameters (campaign, case, command line), model, motion, candidates.
+
+    Parameters
+    ----------
+    campaign, file
+        From `load_campaign`.
+    model
+        A model file in place of the campaign's own.
+    only
+        Names of the cases wanted; empty is all.
+    settings
+        Parameters from the command line; they go over all others.
+
+    Raises
+    ------
+    SpecError, ModelError, ParameterError, MotionError
+        One line that names the case and, for motions, the time and the joint.
+    """
+    path = model or locate(file, campaign.model, "model")
+    names = [case.name for case in campaign.case]
+    for name in only:
+        if name not in names:
+            raise SpecError(f'{file}: no case "{name}"{did_you_mean(name, names)}', file=str(file), case=name)
+    loaded: dict[tuple[tuple[str, float], ...], Mechanism] = {}
+    cases = []
+    for spec in campaign.case:
+        if only and spec.name not in only:
+            continue
+        try:
+            overrides = {**campaign.parameters, **spec.parameters, **(settings or {})}
+            key = tuple(sorted(overrides.items()))
+            if key not in loaded:
+                loaded[key] = _mechanism(path, overrides)
+            _check_candidates(campaign, loaded[key])
+            cases.append(_resolve(spec, file, path, overrides, loaded[key]))
+        except WorkbenchError as error:
+            raise _in_case(error, file, spec.name) from error
+    return cases
+
+
+def locate(campaign_file: Path, name: str, what: str) -> Path:
+    """Find a file that a campaign names: beside the campaign, or in the directory above, never elsewhere.
+
+    Raises
+    ------
+    SpecError
+        An absolute path, one with ``..``, or no such file.
+    """
+    relative = Path(name)
+    if relative.is_absolute() or ".." in relative.parts:
+        raise SpecError(
+            f'{campaign_file}: {what} = "{name}": give a path below the campaign\'s directory or the one above, without'
+            " .. (or name a model on the command line)",
+            file=str(campaign_file),
+        )
+    for directory in (campaign_file.parent, campaign_file.resolve().parent.parent):
+        if (directory / relative).is_file():
+            return directory / relative
+    if what == "model":
+        return find_model(relative)
+    raise SpecError(f'{campaign_file}: {what} = "{name}": no such file', file=str(campaign_file))
+
+
+def _mechanism(path: Path, overrides: Mapping[str, float]) -> Mechanism:
+    loaded = load_model(path, overrides)
+    if loaded.mechanism is None:
+        raise SpecError(f'{path}: <custom> has no <text name="mechanism">, so there is no closed form to validate')
+    return loaded.mechanism
+
+
+def _check_candidates(campaign: Campaign, mechanism: Mechanism) -> None:
+    for candidate in campaign.candidate:
+        if candidate.name not in mechanism.candidates:
+            hint = did_you_mean(candidate.name, mechanism.candidates)
+            raise SpecError(f'{mechanism.name} has no candidate "{candidate.name}"{hint}')
+        if candidate.reference not in mechanism.mass_models:
+            hint = did_you_mean(candidate.reference, mechanism.mass_models)
+            raise SpecError(f'candidate "{candidate.name}": no reference "{candidate.reference}"{hint}')
+    for figure in campaign.figure:
+        if figure.kind == "torque" and figure.joint not in mechanism.joints:
+            hint = did_you_mean(str(figure.joint), mechanism.joints)
+            raise SpecError(f'figure "{figure.id}": no joint "{figure.joint}"{hint}')
+        for curve in figure.curves:
+            kind, _, name = curve.partition(":")
+            valid = mechanism.candidates if kind == "cand" else mechanism.mass_models
+            if kind not in ("cand", "ref") or name not in valid:
+                raise SpecError(f'figure "{figure.id}": curve "{curve}"; valid: cand:CANDIDATE or ref:MASS_MODEL')
+    for claim in campaign.claim:
+        joint = claim.measure.joint
+        if joint is not None and joint not in mechanism.joints:
+            raise SpecError(f'claim "{claim.id}": no joint "{joint}"{did_you_mean(joint, mechanism.joints)}')
+
+
+def _in_case(error: WorkbenchError, file: Path, case: str) -> WorkbenchError:
+    """Name the case; the error keeps its kind and its facts."""
+    facts = {**error.facts, "case": case}
+    prefix = "" if isinstance(error, SpecError) and str(error).startswith(str(file)) else f'{file}: case "{case}": '
+    return type(error)(f"{prefix}{error}", **facts)
+
+
+def _resolve(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float], mechanism: Mechanism) -> Case:
+    planned = plan_motion(spec, file, mechanism)
+    try:
+        if isinstance(planned, PlatformMotion):
+            q, qd, qdd = mechanism.joint_motion(planned.x, planned.xd, planned.xdd)
+            motion = JointMotion(planned.t, q, qd, qdd)
+        else:
+            motion = planned
+        x, xd, xdd = mechanism.platform_motion(motion.q, motion.qd, motion.qdd)
+        mechanism.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
+    except MotionError as error:
+        raise at_time(error, planned.t) from error
+    force = np.tile(np.array(spec.external_force), (len(motion.t), 1))
+    return Case(spec, model, overrides, mechanism, motion, force, x, xd, xdd)
+
+
+def at_time(error: MotionError, t: FloatArray) -> MotionError:
+    """Say the time of the sample that an error names."""
+    sample = error.facts.get("sample")
+    if sample is None:
+        return error
+    time = float(t[sample])
+    text = str(error).removeprefix(f"sample {sample}, ")
+    return MotionError(f"t = {time:.6g} s, {text}", **{**error.facts, "time": time})
+
+
+def plan_motion(spec: CaseSpec, file: Path, mechanism: Mechanism) -> JointMotion | PlatformMotion:
+    """Build the motion that a case asks for.
+
+    Raises
+    ------
+    MotionError
+        As the functions of `workbench.motion`.
+    ParameterError
+        Another number of joints than the mechanism has.
+    """
+    motion = spec.motion
+    if isinstance(motion, CsvMotion):
+        return from_csv(locate(file, motion.file, "motion.file"), mechanism.joints)
+    if isinstance(motion, CycleMotion):
+        return pick_and_place(**motion.model_dump(exclude={"kind"}))
+    joints = len(motion.terms) if isinstance(motion, MultiSineMotion) else len(motion.amplitude)
+    if len(motion.offset) != len(mechanism.joints) or joints != len(mechanism.joints):
+        raise ParameterError(
+            f"motion: {len(motion.offset)} offset(s) and {joints} joint(s); {mechanism.name} has"
+            f" {len(mechanism.joints)} actuated joints: {', '.join(mechanism.joints)}"
+        )
+    t = time_grid(motion.start, motion.stop, samples=motion.samples, rate=motion.rate)
+    if isinstance(motion, SineMotion):
+        return sine(t, motion.offset, motion.amplitude, motion.frequency, motion.phase)
+    return multi_sine(t, motion.offset, motion.terms)

@@ -1,0 +1,181 @@
+"""One case computed: reference and candidates on the same motion, and the rows that say how far apart they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from workbench.arrays import FloatArray
+from workbench.campaign.cases import Case, at_time
+from workbench.campaign.spec import Campaign, CandidateSpec
+from workbench.errors import ArrayError, MotionError
+from workbench.metrics import relative_error
+from workbench.reference import MujocoReference, ReferenceResult
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of ``summary.csv``: a candidate against a reference on one joint of one case."""
+
+    case: str
+    candidate: str
+    reference: str
+    joint: str
+    peak_error: float
+    rms_error: float
+    pointwise_error: float
+    worst_time_s: float
+    bound: float | None
+    verdict: str
+    kind: str
+    unit: str
+    peak_reference: float
+    pointwise_skipped: int
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """What a computed case leaves behind: rows, time series, and facts for the manifest."""
+
+    name: str
+    rows: list[Row]
+    series: dict[str, FloatArray] = field(repr=False)
+    facts: dict[str, Any] = field(repr=False)
+
+
+def compute_case(campaign: Campaign, case: Case) -> CaseResult:
+    """Compute one case.
+
+    Raises
+    ------
+    MotionError
+        The reference cannot follow the motion; the message names the time and the joint.
+    """
+    motion, mechanism = case.motion, case.mechanism
+    reference = MujocoReference(case.model, **case.overrides)
+    results: dict[str, ReferenceResult] = {}
+    series = _motion_columns(case)
+    try:
+        for mass_model in dict.fromkeys(c.reference for c in campaign.candidate):
+            results[mass_model] = reference.inverse_dynamics(motion.q, motion.qd, motion.qdd, mass_model, case.force)
+        torques: dict[str, FloatArray] = {}
+        for name in dict.fromkeys(c.name for c in campaign.candidate):
+            tau = mechanism.candidates[name].function(mechanism, motion.q, motion.qd, motion.qdd, case.force)
+            if tau.shape != motion.q.shape:
+                raise ArrayError(f'candidate "{name}": expected tau of shape {motion.q.shape}, got {tau.shape}')
+            torques[name] = tau
+    except MotionError as error:
+        raise at_time(error, motion.t) from error
+    rows = [
+        row
+        for candidate in campaign.candidate
+        for row in _rows(case, candidate, torques[candidate.name], results[candidate.reference].tau)
+    ]
+    for mass_model, result in results.items():
+        series |= _columns(f"ref_{mass_model}", result.tau, mechanism.joints)
+    for name, tau in torques.items():
+        series |= _columns(f"cand_{name}", tau, mechanism.joints)
+    first = next(iter(results.values()))
+    for joint, force in first.reactions.items():
+        series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
+    series["closure_residual"] = first.closure_residual
+    return CaseResult(case.name, rows, series, _facts(case, reference, first, rows))
+
+
+def _rows(case: Case, candidate: CandidateSpec, tau: FloatArray, reference: FloatArray) -> list[Row]:
+    rows = []
+    for i, joint in enumerate(case.mechanism.joints):
+        error = relative_error(tau[:, i], reference[:, i])
+        if candidate.bound is None:
+            verdict = "measured"
+        else:
+            verdict = "pass" if error.peak_error <= candidate.bound else "fail"
+        rows.append(
+            Row(
+                case=case.name,
+                candidate=candidate.name,
+                reference=candidate.reference,
+                joint=joint,
+                peak_error=error.peak_error,
+                rms_error=error.rms_error,
+                pointwise_error=error.pointwise_error,
+                worst_time_s=float(case.motion.t[error.worst_index]),
+                bound=candidate.bound,
+                verdict=verdict,
+                kind="modelling" if candidate.bound is None else "verification",
+                unit=case.mechanism.force_units[i],
+                peak_reference=error.peak_reference,
+                pointwise_skipped=error.pointwise_skipped,
+            )
+        )
+    return rows
+
+
+def _columns(prefix: str, values: FloatArray, joints: tuple[str, ...]) -> dict[str, FloatArray]:
+    return {f"{prefix}_{joint}": values[:, i] for i, joint in enumerate(joints)}
+
+
+def _motion_columns(case: Case) -> dict[str, FloatArray]:
+    motion = case.motion
+    columns: dict[str, FloatArray] = {"t": motion.t}
+    for prefix, values in (("q", motion.q), ("qd", motion.qd), ("qdd", motion.qdd)):
+        columns |= {f"{prefix}{i + 1}": values[:, i] for i in range(values.shape[1])}
+    for prefix, values in (("x", case.x), ("xd", case.xd), ("xdd", case.xdd)):
+        columns |= {f"{prefix}{i + 1}": values[:, i] for i in range(3)}
+    return columns
+
+
+def _facts(case: Case, reference: MujocoReference, result: ReferenceResult, rows: list[Row]) -> dict[str, Any]:
+    t = case.motion.t
+    mobility = reference.mobility()
+    speed = np.linalg.norm(result.xd, axis=1)
+    acceleration = np.linalg.norm(result.xdd, axis=1)
+    measures = case.mechanism.singularity_measures(case.motion.q)
+    kinematics = {
+        "position": _apart(case.x, result.x),
+        "velocity": _apart(case.xd, result.xd),
+        "acceleration": _apart(case.xdd, result.xdd),
+    }
+    failed = any(row.verdict == "fail" for row in rows)
+    return {
+        "status": "failed" if failed else "passed",
+        "title": case.spec.title,
+        "description": case.spec.description,
+        "message": None,
+        "samples": len(t),
+        "duration_s": float(t[-1] - t[0]),
+        "parameters": case.overrides,
+        "external_force": list(case.spec.external_force),
+        "mobility": mobility.mobility,
+        "joint_freedoms": mobility.joint_freedoms,
+        "rank": mobility.rank,
+        "constraint_rows": mobility.constraint_rows,
+        "redundant_rows": mobility.redundant_rows,
+        "idle_freedoms": mobility.idle_freedoms,
+        "closure_residual": float(result.closure_residual.max()),
+        "velocity_residual": float(result.velocity_residual.max()),
+        "acceleration_residual": float(result.acceleration_residual.max()),
+        "condition": float(result.condition.max()),
+        "peak_speed": float(speed.max()),
+        "speed_at_s": float(t[int(speed.argmax())]),
+        "peak_acceleration": float(acceleration.max()),
+        "acceleration_at_s": float(t[int(acceleration.argmax())]),
+        "singularity": {
+            name: {"min": float(np.abs(v).min()), "time": float(t[int(np.abs(v).argmin())])}
+            for name, v in measures.items()
+        },
+        "kinematics": kinematics,
+        "peak_reactions": {name: float(np.linalg.norm(f, axis=1).max()) for name, f in result.reactions.items()},
+        "warnings": case.mechanism.warnings(case.motion.t, case.motion.q),
+    }
+
+
+def _apart(candidate: FloatArray, reference: FloatArray) -> float:
+    """Largest distance over the largest magnitude; 0 where both vanish."""
+    distance = float(np.linalg.norm(candidate - reference, axis=1).max())
+    magnitude = float(np.linalg.norm(reference, axis=1).max())
+    if magnitude == 0.0:
+        return 0.0 if distance == 0.0 else float("inf")
+    return distance / magnitude

@@ -1,0 +1,59 @@
+"""Where numbers come from: versions, machine, git commit, hash of the model."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import subprocess
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+PACKAGES = ("mujoco-core", "numpy", "scipy", "pandas", "numba", "pyarrow")
+
+
+def versions() -> dict[str, str]:
+    """Versions of the workbench, Python and the packages whose code makes the numbers."""
+    found = {"workbench": _version("parallel-robot-workbench"), "python": platform.python_version()}
+    return found | {name.removesuffix("-core"): _version(name) for name in PACKAGES}
+
+
+def _version(distribution: str) -> str:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        from workbench._version import __version__  # noqa: PLC0415
+
+        return __version__ if distribution == "parallel-robot-workbench" else "unknown"
+
+
+def machine() -> dict[str, str | int]:
+    """System, processor and number of cores."""
+    return {
+        "system": f"{platform.system()} {platform.release()}",
+        "processor": platform.machine(),
+        "cores": os.cpu_count() or 1,
+    }
+
+
+def git_commit(directory: Path) -> str | None:
+    """Commit of the checkout that holds *directory*, with ``+`` where it has uncommitted changes; None outside one."""
+
+    def git(*arguments: str) -> str | None:
+        try:
+            done = subprocess.run(
+                ["git", *arguments], cwd=directory, capture_output=True, text=True, timeout=10, check=True
+            )
+        except (OSError, subprocess.SubprocessError):
+            return None
+        return done.stdout.strip()
+
+    commit = git("rev-parse", "HEAD")
+    if commit is None:
+        return None
+    return f"{commit}+" if git("status", "--porcelain", "--untracked-files=no") else commit
+
+
+def sha256(data: bytes) -> str:
+    """Hexadecimal SHA-256."""
+    return hashlib.sha256(data).hexdigest()

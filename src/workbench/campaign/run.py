@@ -1,0 +1,151 @@
+"""Run a campaign: resolve everything, compute case by case, write the run directory."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from workbench.campaign import provenance, store
+from workbench.campaign.cases import Case, resolve_cases
+from workbench.campaign.claims import judge_claims
+from workbench.campaign.compare import CaseResult, Row, compute_case
+from workbench.campaign.spec import Campaign, load_campaign
+from workbench.errors import WorkbenchError
+from workbench.mechanisms.base import stored_names
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished run: where it lies, whether every bound holds, and the rows."""
+
+    directory: Path
+    passed: bool
+    rows: list[Row]
+    manifest: dict[str, Any]
+
+
+Progress = Callable[[str, int, int], None]
+"""Called with a case's name, its number from 0, and the number of cases; at the end with an empty name."""
+
+
+def run_campaign(
+    path: str | Path,
+    out: Path | None = None,
+    *,
+    model: Path | None = None,
+    only: Sequence[str] = (),
+    settings: Mapping[str, float] | None = None,
+    command: Sequence[str] = (),
+    progress: Progress | None = None,
+    report: Callable[[Path], object] | None = None,
+) -> Outcome:
+    """Run a campaign and write its run directory.
+
+    Parameters
+    ----------
+    path
+        Campaign file, or the name of a bundled one.
+    out
+        Run directory; None is ``reports/<campaign name>``.
+    model
+        A model in place of the campaign's.
+    only
+        Names of the cases to run; empty is all.
+    settings
+        Parameters that go over those of campaign and cases.
+    command
+        The command line, for the manifest.
+    progress
+        Called before each case.
+    report
+        Called with the directory when the results stand in it, before it is moved to its place.
+
+    Raises
+    ------
+    WorkbenchError
+        Bad input, in one line; then nothing was written.
+    """
+    started, clock = datetime.now(UTC), time.perf_counter()
+    campaign, file = load_campaign(path)
+    directory = out or Path("reports") / campaign.name
+    store.check_output(directory)
+    cases = resolve_cases(campaign, file, model, tuple(only), settings)
+    results: list[CaseResult] = []
+    with store.staged(directory) as stage:
+        for number, case in enumerate(cases):
+            if progress:
+                progress(case.name, number, len(cases))
+            results.append(_compute(campaign, case, file))
+            store.write_series(stage, case.name, results[-1].series)
+        if progress:
+            progress("", len(cases), len(cases))
+        rows = [row for result in results for row in result.rows]
+        facts = {result.name: result.facts for result in results}
+        passed = all(f["status"] == "passed" for f in facts.values())
+        manifest = _manifest(campaign, file, cases, facts, rows) | {
+            "command": shlex.join(command),
+            "started": started.isoformat(timespec="seconds"),
+            "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+            "seconds": round(time.perf_counter() - clock, 3),
+            "status": "passed" if passed else "failed",
+        }
+        store.write_summary(stage, rows)
+        store.write_manifest(stage, manifest)
+        if report:
+            report(stage)
+    return Outcome(directory, passed, rows, manifest)
+
+
+def _compute(campaign: Campaign, case: Case, file: Path) -> CaseResult:
+    try:
+        return compute_case(campaign, case)
+    except WorkbenchError as error:
+        raise type(error)(f'{file}: case "{case.name}": {error}', **{**error.facts, "case": case.name}) from error
+
+
+def _manifest(
+    campaign: Campaign, file: Path, cases: list[Case], facts: Mapping[str, Mapping[str, Any]], rows: list[Row]
+) -> dict[str, Any]:
+    mechanism = cases[0].mechanism
+    model = cases[0].model
+    values = dataclasses.asdict(mechanism.parameters)
+    candidates = {c.name: mechanism.candidates[c.name] for c in campaign.candidate}
+    return {
+        "format": store.FORMAT,
+        "campaign": campaign.name,
+        "title": campaign.title,
+        "description": campaign.description,
+        "spec_file": str(file),
+        "spec": campaign.model_dump(),
+        "model": {
+            "file": str(model),
+            "sha256": provenance.sha256(model.read_bytes()),
+            "mechanism": mechanism.name,
+            "title": mechanism.title,
+            "reference_key": mechanism.reference_key,
+        },
+        "joints": list(mechanism.joints),
+        "coordinate_units": list(mechanism.coordinate_units),
+        "force_units": list(mechanism.force_units),
+        "platform_axes": list(mechanism.platform_axes),
+        "parameters": [
+            {"name": name, "value": values[name], "unit": info.unit, "meaning": info.meaning, "source": info.source}
+            for name, info in stored_names(mechanism.parameter_table).items()
+        ],
+        "candidates": {
+            name: {"mass_model": c.mass_model, "description": c.description, "source": c.source}
+            for name, c in candidates.items()
+        },
+        "claims": judge_claims(campaign, rows, facts),
+        "figures": [figure.model_dump() for figure in campaign.figure if figure.case in facts],
+        "cases": dict(facts),
+        "versions": provenance.versions(),
+        "machine": provenance.machine(),
+        "git_commit": provenance.git_commit(file.resolve().parent),
+    }

@@ -1,0 +1,285 @@
+"""The campaign file: a TOML document, validated against a strict schema before anything runs.
+
+Every key is documented in docs/campaign.md. A campaign is data: nothing in it can run code, and the files that it names
+lie beside it.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from workbench.data_files import bundled
+from workbench.errors import SpecError, WorkbenchError, did_you_mean
+
+FORMAT = 1
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}$"
+"""Names of campaigns and cases become file names: letters, digits and ``_ . + -``."""
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Vector = Annotated[list[Finite], Field(min_length=1)]
+Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+
+
+class Strict(BaseModel):
+    """No unknown keys, no silent conversion of text to numbers."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Window(Strict):
+    """When a motion is sampled: seconds, and either a number of samples or a rate in hertz."""
+
+    start: Finite = 0.0
+    stop: Finite
+    samples: int | None = None
+    rate: Finite | None = None
+
+    @model_validator(mode="after")
+    def _one_of(self) -> Window:
+        if (self.samples is None) == (self.rate is None):
+            raise ValueError("give exactly one of samples and rate")
+        return self
+
+
+class SineMotion(Window):
+    """One sinusoid per joint."""
+
+    kind: Literal["sine"]
+    offset: Vector
+    amplitude: Vector
+    frequency: Vector
+    phase: Vector | None = None
+
+
+class MultiSineMotion(Window):
+    """Any number of sinusoids per joint, each ``[amplitude, frequency, phase]``."""
+
+    kind: Literal["multi_sine"]
+    offset: Vector
+    terms: list[list[Annotated[list[Finite], Field(min_length=2, max_length=3)]]]
+
+
+class CycleMotion(Strict):
+    """A pick-and-place cycle planned in platform space."""
+
+    kind: Literal["pick_and_place"]
+    pick: Triple
+    place: Triple
+    lift: Finite | Triple
+    up: Triple | None = None
+    lift_time: Finite
+    traverse_time: Finite
+    lower_time: Finite | None = None
+    dwell: Finite = 0.0
+    overlap: Finite = 0.0
+    back: bool = False
+    law: str = "quintic"
+    samples: int | None = None
+    rate: Finite | None = None
+
+
+class CsvMotion(Strict):
+    """A motion from a file beside the campaign: ``t, q1, q2, q3`` and, if given, derivatives."""
+
+    kind: Literal["csv"]
+    file: str
+
+
+Motion = Annotated[SineMotion | MultiSineMotion | CycleMotion | CsvMotion, Field(discriminator="kind")]
+
+
+class CandidateSpec(Strict):
+    """A closed form, the reference mass model it is held against, and the bound on its peak error.
+
+    Without a bound the row is a measured modelling error and has no verdict.
+    """
+
+    name: str
+    reference: str
+    bound: Annotated[Finite, Field(gt=0)] | None = None
+
+
+class CaseSpec(Strict):
+    """One robot on one motion."""
+
+    name: Annotated[str, Field(pattern=NAME)]
+    title: str = ""
+    description: str = ""
+    motion: Motion
+    parameters: dict[str, Finite] = {}
+    external_force: Triple = [0.0, 0.0, 0.0]
+
+
+class Measure(Strict):
+    """Where a claim's figure is found: a number of a case, or the largest over joints of an error column."""
+
+    quantity: Literal[
+        "peak_speed", "peak_acceleration", "mobility", "rank", "peak_error", "rms_error", "pointwise_error",
+    ]  # fmt: skip
+    case: str
+    candidate: str | None = None
+    reference: str | None = None
+    joint: str | None = None
+
+
+class ClaimSpec(Strict):
+    """A figure that a paper prints, and how it is measured here."""
+
+    id: str
+    text: str
+    source: str
+    kind: Literal["upper", "value"]
+    claimed: Finite
+    within: Finite = 0.0
+    """for ``value``: half of the last printed digit"""
+    unit: str
+    measure: Measure
+    note: str = ""
+
+
+class FigureSpec(Strict):
+    """A figure of the paper, redrawn."""
+
+    id: str
+    title: str
+    case: str
+    kind: Literal["platform", "platform_velocity", "platform_acceleration", "torque"]
+    joint: str | None = None
+    curves: list[str] = []
+    source: str = ""
+
+
+class Campaign(Strict):
+    """A whole campaign file."""
+
+    format: Literal[1] = FORMAT
+    name: Annotated[str, Field(pattern=NAME)]
+    title: str
+    description: str = ""
+    model: str
+    parameters: dict[str, Finite] = {}
+    candidate: Annotated[list[CandidateSpec], Field(min_length=1)]
+    case: Annotated[list[CaseSpec], Field(min_length=1)]
+    claim: list[ClaimSpec] = []
+    figure: list[FigureSpec] = []
+
+
+def load_campaign(path: str | Path) -> tuple[Campaign, Path]:
+    """Read and validate a campaign file.
+
+    Parameters
+    ----------
+    path
+        A TOML file, or the name of a campaign that comes with the package.
+
+    Returns
+    -------
+    Campaign, Path
+        The campaign and the file it was read from.
+
+    Raises
+    ------
+    SpecError
+        Missing or malformed file, unknown key (with the nearest valid one), a value of the wrong kind; the message
+        names file, key, value and what is allowed.
+    """
+    found = _find(Path(path))
+    try:
+        document = tomllib.loads(found.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SpecError(f"{path}: {error.strerror or error}", file=str(path)) from error
+    except UnicodeDecodeError as error:
+        raise SpecError(f"{path}: not UTF-8 text (byte {error.start})", file=str(path)) from error
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(f"{path}: not valid TOML: {error}", file=str(path)) from error
+    try:
+        campaign = Campaign.model_validate(document)
+    except ValidationError as error:
+        raise SpecError(f"{path}: {_first(error, document)}", file=str(path)) from error
+    _check_names(campaign, str(path))
+    return campaign, found
+
+
+def _find(path: Path) -> Path:
+    if path.is_file():
+        return path
+    if path.parts and (len(path.parts) == 1 or path.parts[0] == "campaigns"):
+        try:
+            return bundled("campaigns", path.name)
+        except WorkbenchError:
+            pass
+    raise SpecError(f"{path}: no such campaign file", file=str(path))
+
+
+def _first(error: ValidationError, document: dict[str, Any]) -> str:
+    """One line for the first thing that pydantic found: key, what is wrong, value, what is allowed."""
+    # an unknown key explains a missing one, so it goes first
+    issue = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    place = [part for part in issue["loc"] if part not in _TAGS]
+    where = _place(place, document)
+    if issue["type"] == "extra_forbidden":
+        key = str(place[-1])
+        return f'{where}: unknown key{did_you_mean(key, _valid_keys(issue["loc"]))}'
+    if issue["type"] == "missing":
+        return f"{where}: missing; this key is required"
+    value = repr(issue["input"])
+    shown = value if len(value) <= 60 else value[:57] + "..."
+    message = issue["msg"].removeprefix("Value error, ")
+    return f"{where} = {shown}: {message[0].lower()}{message[1:]}"
+
+
+_MOTIONS: dict[str, type[Strict]] = {
+    "sine": SineMotion, "multi_sine": MultiSineMotion, "pick_and_place": CycleMotion, "csv": CsvMotion,
+}  # fmt: skip
+_TAGS = frozenset({*_MOTIONS, "float", "constrained-float"})
+_SECTIONS: dict[str, type[Strict]] = {
+    "candidate": CandidateSpec, "case": CaseSpec, "claim": ClaimSpec, "figure": FigureSpec, "measure": Measure,
+}  # fmt: skip
+
+
+def _valid_keys(place: tuple[int | str, ...]) -> list[str]:
+    """Keys that are valid beside the one at *place*."""
+    model: type[Strict] = Campaign
+    for part in place[:-1]:
+        model = _MOTIONS.get(str(part), _SECTIONS.get(str(part), model))
+    return list(model.model_fields)
+
+
+def _place(place: list[int | str], document: Any) -> str:
+    """``case "simulation_1".motion.stop``: the key's path with names in place of numbers where there are names."""
+    text, node = "", document
+    for part in place:
+        try:
+            node = node[part]  # type: ignore[index]
+        except (KeyError, IndexError, TypeError):
+            node = None
+        if isinstance(part, int):
+            name = next((node[k] for k in ("name", "id") if isinstance(node, dict) and isinstance(node.get(k), str)), "")
+            text += f' "{name}"' if name else f"[{part + 1}]"
+        else:
+            text += f".{part}" if text else str(part)
+    return text
+
+
+def _check_names(campaign: Campaign, file: str) -> None:
+    """Names that have to be unique, and names that have to exist."""
+    cases = [case.name for case in campaign.case]
+    for name in cases:
+        if cases.count(name) > 1:
+            raise SpecError(f'{file}: two cases have the name "{name}"', file=file, case=name)
+    # names become file names, and some file systems do not tell A from a
+    if len({name.lower() for name in cases}) < len(cases):
+        raise SpecError(f"{file}: two case names differ only in upper and lower case", file=file)
+    rows = [(c.name, c.reference) for c in campaign.candidate]
+    for row in rows:
+        if rows.count(row) > 1:
+            raise SpecError(f'{file}: candidate "{row[0]}" against "{row[1]}" stands twice', file=file)
+    for kind, items in (("claim", campaign.claim), ("figure", campaign.figure)):
+        for item in items:
+            case = item.measure.case if isinstance(item, ClaimSpec) else item.case
+            if case not in cases:
+                raise SpecError(f'{file}: {kind} "{item.id}" names case "{case}"{did_you_mean(case, cases)}', file=file)

@@ -1,0 +1,145 @@
+"""What a run shows on a terminal: progress while it runs, then the errors and the verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from types import TracebackType
+from typing import Any, Self
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+from workbench.campaign.compare import Row
+from workbench.campaign.run import Outcome
+
+WIDE = 110
+"""Columns of a table where there is no terminal to ask, in a log for instance."""
+
+
+def _console(stderr: bool) -> Console:
+    console = Console(stderr=stderr, highlight=False)
+    return console if console.is_terminal else Console(stderr=stderr, highlight=False, width=WIDE)
+
+
+out = _console(stderr=False)
+err = _console(stderr=True)
+
+STYLES = {"pass": "green", "fail": "bold red", "measured": "cyan"}
+
+
+class CaseProgress:
+    """A progress bar on a terminal, one plain line per case elsewhere."""
+
+    def __init__(self) -> None:
+        self._bar = Progress(
+            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+            console=err, transient=True, disable=not err.is_terminal,
+        )  # fmt: skip
+        self._task: Any = None
+
+    def __enter__(self) -> Self:
+        """Start the bar."""
+        self._bar.start()
+        self._task = self._bar.add_task("preparing", total=None)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Take the bar away."""
+        self._bar.stop()
+
+    def __call__(self, case: str, number: int, total: int) -> None:
+        """Show that a case begins; an empty name means that the report is being written."""
+        label = escape(case) if case else "writing the report"
+        if err.is_terminal:
+            self._bar.update(self._task, description=label, completed=number, total=total)
+        elif case:
+            err.print(f"[{number + 1}/{total}] {case}", markup=False)
+
+
+def print_outcome(outcome: Outcome) -> None:
+    """Print the table of errors, the claims, the verdict and where the report lies."""
+    manifest = outcome.manifest
+    verification = [row for row in outcome.rows if row.kind == "verification"]
+    modelling = [row for row in outcome.rows if row.kind == "modelling"]
+    joints = manifest["joints"]
+    if verification:
+        out.print(_table("Verification: closed form against MuJoCo, same masses", verification, joints, _scientific))
+    if modelling:
+        out.print(_table("Modelling error: what the simpler mass model costs", modelling, joints, _percent))
+    out.print(Text("Each error is max|tau - tau_ref| / max|tau_ref| of that joint over the case."), style="dim")
+    for name, case in manifest["cases"].items():
+        for warning in case["warnings"]:
+            out.print(Text(f'warning: case "{name}": {warning}'), style="yellow")
+    refuted = [claim for claim in manifest["claims"] if claim["holds"] is False]
+    if manifest["claims"]:
+        held = sum(claim["holds"] is True for claim in manifest["claims"])
+        undecided = len(manifest["claims"]) - held - len(refuted)
+        counts = [f"{held} confirmed", f"{len(refuted)} not confirmed", f"{undecided} cannot be decided"]
+        out.print(Text(f"Claims of the paper: {', '.join(c for c in counts if not c.startswith('0 '))}."))
+    for claim in refuted:
+        measured, claimed = _quantity(claim["measured"], claim["unit"]), _quantity(claim["claimed"], claim["unit"])
+        out.print(Text(f"  not confirmed: {claim['text']}: measured {measured}, printed {claimed} ({claim['source']})"))
+    failed = sum(row.verdict == "fail" for row in verification)
+    out.print(_verdict(outcome, len(verification), failed))
+    out.print(Text(f"Report: {outcome.directory / 'report.html'}"), soft_wrap=True)
+
+
+def _verdict(outcome: Outcome, checks: int, failed: int) -> Text:
+    cases = outcome.manifest["cases"]
+    worst = max((row.peak_error for row in outcome.rows if row.kind == "verification"), default=math.nan)
+    if outcome.passed:
+        return Text(
+            f"PASSED: {checks} checks in {len(cases)} cases within their bounds; largest error {worst:.2g}.",
+            style="bold green",
+        )
+    names = ", ".join(name for name, case in cases.items() if case["status"] != "passed")
+    return Text(f"FAILED: {failed} of {checks} checks beyond their bounds; cases: {names}.", style="bold red")
+
+
+def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any) -> Table:
+    bounds = {row.bound for row in rows}
+    common = bounds.pop() if len(bounds) == 1 else None
+    if common is not None:
+        title += f"; bound {common:.0e}"
+    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in ("case", "candidate", "MuJoCo model"):
+        table.add_column(column, overflow="fold")
+    for joint in joints:
+        table.add_column(joint, justify="right", no_wrap=True)
+    if common is None and None not in bounds:
+        table.add_column("bound", justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    groups: dict[tuple[str, str, str], list[Row]] = {}
+    for row in rows:
+        groups.setdefault((row.case, row.candidate, row.reference), []).append(row)
+    previous = ""
+    for (case, candidate, reference), members in groups.items():
+        verdict = "fail" if any(r.verdict == "fail" for r in members) else members[0].verdict
+        cells = [Text(case if case != previous else ""), Text(candidate), Text(reference)]
+        cells += [Text(show(r.peak_error), style="red" if r.verdict == "fail" else "") for r in members]
+        if common is None and None not in bounds:
+            cells.append(Text(f"{members[0].bound:.0e}"))
+        table.add_row(*cells, Text(verdict, style=STYLES[verdict]))
+        previous = case
+    return table
+
+
+def _scientific(value: float) -> str:
+    return f"{value:.1e}"
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.2f} %"
+
+
+def _quantity(value: float, unit: str) -> str:
+    if unit in ("", "1", "%"):
+        return f"{100 * value:.2g} %" if unit == "%" else f"{value:.4g}"
+    return f"{value:.4g} {unit}"
