@@ -104,16 +104,15 @@ def _verdict(outcome: Outcome, checks: int, failed: int) -> Text:
 
 
 def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any) -> Table:
-    bounds = {row.bound for row in rows}
-    common = bounds.pop() if len(bounds) == 1 else None
-    if common is not None:
-        title += f"; bound {common:.0e}"
+    bounds = {row.bound for row in rows if row.bound is not None}
+    if len(bounds) == 1:
+        title += f"; bound {next(iter(bounds)):.0e}"
     table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     for column in ("case", "candidate", "MuJoCo model"):
         table.add_column(column, overflow="fold")
     for joint in joints:
         table.add_column(joint, justify="right", no_wrap=True)
-    if common is None and None not in bounds:
+    if len(bounds) > 1:
         table.add_column("bound", justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     groups: dict[tuple[str, str, str], list[Row]] = {}
@@ -124,8 +123,8 @@ def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any) -> Tab
         verdict = "fail" if any(r.verdict == "fail" for r in members) else members[0].verdict
         cells = [Text(case if case != previous else ""), Text(candidate), Text(reference)]
         cells += [Text(show(r.peak_error), style="red" if r.verdict == "fail" else "") for r in members]
-        if common is None and None not in bounds:
-            cells.append(Text(f"{members[0].bound:.0e}"))
+        if len(bounds) > 1:
+            cells.append(Text("" if members[0].bound is None else f"{members[0].bound:.0e}"))
         table.add_row(*cells, Text(verdict, style=STYLES[verdict]))
         previous = case
     return table
