@@ -25,8 +25,8 @@ def random_changes(rng: np.random.Generator) -> dict[str, float]:
     values: dict[str, float] = {}
     for name, nominal in NOMINAL.items():
         for key in (f"{name}_left", f"{name}_right") if name in SIDED else (name,):
-            mass = name.startswith("m")
-            values[key] = nominal * float(np.exp(rng.uniform(np.log(0.3), np.log(3))) if mass else rng.uniform(0.7, 1.3))
+            factor = np.exp(rng.uniform(np.log(0.3), np.log(3.0))) if name.startswith("m") else rng.uniform(0.7, 1.3)
+            values[key] = nominal * float(factor)
     values["payload"] = float(rng.uniform(0.0, 2.0))
     for bar in ("1_left", "1_right", "2_left", "2_right", "5"):
         values[f"k{bar}"] = float(rng.uniform(0.2, 0.8))
@@ -48,13 +48,20 @@ def sine_sum(rng: np.random.Generator, t: np.ndarray, scale: float = 1.0) -> Mot
     return q, qd, qdd
 
 
-def motion_inside(mech: Mechanism, rng: np.random.Generator, t: np.ndarray, tries: int = 20) -> tuple[Motion | None, int]:
-    """A random motion that the closed-form kinematics accept, and how many were refused before it."""
+def motion_inside(
+    mech: Mechanism, rng: np.random.Generator, t: np.ndarray, tries: int = 20, away: float = 0.0
+) -> tuple[Motion | None, int]:
+    """A random motion that the closed-form kinematics accept, and how many were refused before it.
+
+    *away* is the least value that every singularity measure keeps.
+    """
     for refused in range(tries):
         motion = sine_sum(rng, t)
         try:
-            mech.forward_kinematics(motion[0])
+            measures = mech.singularity_measures(motion[0])
         except MotionError:
+            continue
+        if min(np.abs(value).min() for value in measures.values()) < away:
             continue
         return motion, refused
     return None, tries

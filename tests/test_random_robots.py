@@ -9,9 +9,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from robots import MODEL, Motion, motion_inside, peak_error, random_changes
 
 import workbench as wb
+from robots import MODEL, Motion, motion_inside, peak_error, random_changes
 from workbench.mechanisms.base import Mechanism
 
 BOUND = 1e-10  # peak-normalised, per joint: rounding with a wide margin, below any modelling error

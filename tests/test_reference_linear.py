@@ -1,0 +1,124 @@
+"""Rank-revealing least squares against NumPy's singular value decomposition, on matrices that lack rank."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from workbench.reference.linear import factor, least_squares, solve_transposed
+
+TOLERANCE = 1e-11  # rounding of a factor with condition number up to about 100
+
+shapes = st.tuples(st.integers(1, 14), st.integers(1, 12), st.integers(0, 12), st.integers(0, 2**32 - 1))
+
+
+def matrix_of_rank(rows: int, columns: int, rank: int, rng: np.random.Generator) -> np.ndarray:
+    """Singular values between 1 and 10, of any scale between a thousandth and a thousand."""
+    left = np.linalg.qr(rng.normal(size=(rows, rows)))[0][:, :rank]
+    right = np.linalg.qr(rng.normal(size=(columns, columns)))[0][:, :rank]
+    return 10.0 ** rng.uniform(-3, 3) * (left * rng.uniform(1.0, 10.0, rank)) @ right.T
+
+
+def least_norm(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, int]:
+    """y with A^T y = rhs by the compiled routines, and the rank."""
+    a = matrix.copy()
+    beta, perm = np.zeros(a.shape[1]), np.zeros(a.shape[1], dtype=np.int64)
+    rank = factor(a, beta, perm)
+    y = np.full(a.shape[0], np.nan)
+    solve_transposed(a, beta, perm, rank, rhs, y)
+    return y, rank
+
+
+@given(shapes)
+def test_solution_rank_and_residual(shape: tuple[int, int, int, int]) -> None:
+    rows, columns, rank, seed = shape
+    rank = min(rank, rows, columns)
+    rng = np.random.default_rng(seed)
+    a, b = matrix_of_rank(rows, columns, rank, rng), rng.normal(size=rows)
+    x, found, residual = least_squares(a, b)
+    best = np.linalg.pinv(a, rcond=1e-8) @ b
+    scale = max(1.0, float(np.abs(best).max()))
+    assert found == rank
+    # a basic solution: the same residual as the least-norm one, at most `rank` entries that are not zero
+    assert np.abs(a @ x - a @ best).max() <= TOLERANCE
+    assert residual == pytest.approx(np.linalg.norm(a @ best - b), abs=TOLERANCE)
+    assert np.count_nonzero(x) <= rank
+    if rank == columns:
+        assert np.abs(x - best).max() <= TOLERANCE * scale
+
+
+@given(shapes)
+def test_transposed_solution_is_the_least_norm_one(shape: tuple[int, int, int, int]) -> None:
+    rows, columns, rank, seed = shape
+    rank = min(rank, rows, columns)
+    rng = np.random.default_rng(seed)
+    a = matrix_of_rank(rows, columns, rank, rng)
+    rhs = a.T @ rng.normal(size=rows)  # consistent, as forces along the constraints are
+    y, found = least_norm(a, rhs)
+    best = np.linalg.pinv(a.T, rcond=1e-8) @ rhs
+    assert found == rank
+    assert np.abs(y - best).max() <= TOLERANCE * max(1.0, float(np.abs(best).max()))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_residual_is_orthogonal_to_every_column(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a, b = matrix_of_rank(12, 7, 4, rng), rng.normal(size=12)
+    x, _, _ = least_squares(a, b)
+    assert np.abs(a.T @ (a @ x - b)).max() <= TOLERANCE * np.abs(a).max() * 100
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_solution_moved_by_a_millionth_is_noticed(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a, b = matrix_of_rank(9, 5, 5, rng), rng.normal(size=9)
+    x, _, residual = least_squares(a, b)
+    moved = x.copy()
+    moved[int(np.argmax(np.abs(x)))] *= 1.0 + 1e-6
+    assert np.abs(a @ moved - a @ (np.linalg.pinv(a) @ b)).max() > 10 * TOLERANCE
+    assert np.linalg.norm(a @ moved - b) > residual * (1 - 1e-15)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_rank_is_judged_against_the_largest_column(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a = matrix_of_rank(8, 4, 4, rng)
+    for disturbance, rank in ((1e-14, 4), (1e-7, 5)):
+        extra = a @ rng.uniform(0.5, 1.0, 4) + disturbance * np.abs(a).max() * rng.normal(size=8)
+        assert least_squares(np.column_stack([a, extra]), np.ones(8))[1] == rank
+
+
+def test_repeated_rows_and_columns_change_no_residual() -> None:
+    rng = np.random.default_rng(5)
+    a, b = matrix_of_rank(6, 4, 4, rng), rng.normal(size=6)
+    x, _, _ = least_squares(a, b)
+    doubled, rank, _ = least_squares(np.vstack([a, a]), np.concatenate([b, b]))
+    assert rank == 4
+    assert np.abs(doubled - x).max() <= TOLERANCE * max(1.0, np.abs(x).max())
+    twice, rank, _ = least_squares(np.hstack([a, a]), b)
+    assert rank == 4
+    assert np.abs(twice[:4] + twice[4:] - x).max() <= TOLERANCE * max(1.0, np.abs(x).max())
+
+
+def test_a_zero_matrix_has_rank_zero_and_a_zero_solution() -> None:
+    x, rank, residual = least_squares(np.zeros((3, 2)), np.array([3.0, 0.0, 4.0]))
+    assert rank == 0
+    assert np.array_equal(x, np.zeros(2))
+    assert residual == pytest.approx(5.0)
+
+
+def test_arguments_are_left_as_they_were() -> None:
+    a, b = np.arange(6.0).reshape(3, 2), np.ones(3)
+    before = a.copy(), b.copy()
+    least_squares(a, b)
+    assert np.array_equal(a, before[0])
+    assert np.array_equal(b, before[1])
+
+
+def test_not_a_number_is_no_rank() -> None:
+    assert least_squares(np.array([[np.nan]]), np.ones(1))[1] == 0
+    mixed = np.array([[1.0, np.nan], [0.0, 1.0]])
+    x, rank, _ = least_squares(mixed, np.ones(2))
+    assert rank < 2 or np.isnan(x).any()
