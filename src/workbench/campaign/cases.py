@@ -10,9 +10,11 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.campaign.spec import Campaign, CaseSpec, CsvMotion, CycleMotion, MultiSineMotion, SineMotion
+from workbench.campaign.spec import MAX_SAMPLES, shorten
+from workbench.data_files import bundled, bundled_names
 from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
 from workbench.mechanisms.base import Mechanism
-from workbench.mjcf import find_model, load_model
+from workbench.mjcf import load_model
 from workbench.motion import JointMotion, PlatformMotion, from_csv, multi_sine, pick_and_place, sine, time_grid
 
 
@@ -83,24 +85,34 @@ def resolve_cases(
 def locate(campaign_file: Path, name: str, what: str) -> Path:
     """Find a file that a campaign names: beside the campaign, or in the directory above, never elsewhere.
 
+    A model may also be one of those that come with the package, ``models/NAME.xml``.
+
     Raises
     ------
     SpecError
-        An absolute path, one with ``..``, or no such file.
+        An absolute path, one with ``..``, a link that leads out of these directories, or no such file.
     """
-    relative = Path(name)
+    key, relative = f'{campaign_file}: {what} = "{shorten(name)}"', Path(name)
+    facts = {"file": str(campaign_file), "key": what, "value": name}
     if relative.is_absolute() or ".." in relative.parts:
+        other = " (--model names one anywhere)" if what == "model" else ""
         raise SpecError(
-            f'{campaign_file}: {what} = "{name}": give a path below the campaign\'s directory or the one above, without'
-            " .. (or name a model on the command line)",
-            file=str(campaign_file),
+            f"{key}: allowed: a path below the campaign's directory or the one above, without ..{other}", **facts
         )
-    for directory in (campaign_file.parent, campaign_file.resolve().parent.parent):
-        if (directory / relative).is_file():
-            return directory / relative
-    if what == "model":
-        return find_model(relative)
-    raise SpecError(f'{campaign_file}: {what} = "{name}": no such file', file=str(campaign_file))
+    try:
+        # the campaign's name may be a link; what it names lies beside the link's target
+        home = campaign_file.resolve().parent
+        for directory in (home, home.parent):
+            if (directory / relative).is_file():
+                if not (directory / relative).resolve().is_relative_to(home.parent):
+                    raise SpecError(f"{key}: a link that leads out of {home.parent}", **facts)
+                return campaign_file.parent / relative if directory == home else directory / relative
+    except (OSError, ValueError) as error:  # a name longer than the system allows, a null character in it
+        reason = error.strerror if isinstance(error, OSError) else None
+        raise SpecError(f"{key}: {reason or error}", **facts) from error
+    if what == "model" and relative.parts[:1] == ("models",) and relative.name in bundled_names("models"):
+        return bundled("models", relative.name)
+    raise SpecError(f"{key}: no such file", **facts)
 
 
 def _mechanism(path: Path, overrides: Mapping[str, float]) -> Mechanism:
@@ -122,11 +134,6 @@ def _check_candidates(campaign: Campaign, mechanism: Mechanism) -> None:
         if figure.kind == "torque" and figure.joint not in mechanism.joints:
             hint = did_you_mean(str(figure.joint), mechanism.joints)
             raise SpecError(f'figure "{figure.id}": no joint "{figure.joint}"{hint}')
-        for curve in figure.curves:
-            kind, _, name = curve.partition(":")
-            valid = mechanism.candidates if kind == "cand" else mechanism.mass_models
-            if kind not in ("cand", "ref") or name not in valid:
-                raise SpecError(f'figure "{figure.id}": curve "{curve}"; valid: cand:CANDIDATE or ref:MASS_MODEL')
     for claim in campaign.claim:
         joint = claim.measure.joint
         if joint is not None and joint not in mechanism.joints:
@@ -142,6 +149,8 @@ def _in_case(error: WorkbenchError, file: Path, case: str) -> WorkbenchError:
 
 def _resolve(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float], mechanism: Mechanism) -> Case:
     planned = plan_motion(spec, file, mechanism)
+    if len(planned.t) > MAX_SAMPLES:
+        raise MotionError(f"motion: {len(planned.t)} samples; allowed: at most {MAX_SAMPLES}", value=len(planned.t))
     try:
         if isinstance(planned, PlatformMotion):
             q, qd, qdd = mechanism.joint_motion(planned.x, planned.xd, planned.xdd)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from workbench.campaign.compare import Row
 from workbench.campaign.spec import Campaign, ClaimSpec, Measure
 
@@ -42,6 +44,9 @@ def _judge(claim: ClaimSpec, rows: list[Row], facts: Mapping[str, Mapping[str, A
 def _measure(measure: Measure, rows: list[Row], facts: Mapping[str, Mapping[str, Any]]) -> float | None:
     if measure.case not in facts:
         return None
+    if measure.quantity == "solution_distance":
+        solutions = np.array(facts[measure.case]["solutions_at_start"])
+        return float(np.abs(solutions - np.array(measure.point)).max(axis=1).min())
     if measure.quantity not in ERRORS:
         value = facts[measure.case].get(measure.quantity)
         return None if value is None else float(value)

@@ -134,6 +134,7 @@ def _manifest(
         "coordinate_units": list(mechanism.coordinate_units),
         "force_units": list(mechanism.force_units),
         "platform_axes": list(mechanism.platform_axes),
+        "mobility_count": mechanism.mobility_count(),
         "parameters": [
             {"name": name, "value": values[name], "unit": info.unit, "meaning": info.meaning, "source": info.source}
             for name, info in stored_names(mechanism.parameter_table).items()

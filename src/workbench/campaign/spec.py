@@ -19,15 +19,25 @@ FORMAT = 1
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}$"
 """Names of campaigns and cases become file names: letters, digits and ``_ . + -``."""
 
+NAME_RULE = "allowed: letters, digits and _ . + -, first a letter or digit, at most 100 characters"
+
+MAX_SAMPLES = 100_000
+"""Samples of one case: the reference holds some 20 kB of matrices for each while it computes."""
+
+SHOWN = 60
+"""Longest piece of a campaign's text that a message repeats."""
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = Annotated[list[Finite], Field(min_length=1)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+Name = Annotated[str, Field(pattern=NAME)]
+Samples = Annotated[int, Field(le=MAX_SAMPLES)]
 
 
 class Strict(BaseModel):
     """No unknown keys, no silent conversion of text to numbers."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Window(Strict):
@@ -35,13 +45,15 @@ class Window(Strict):
 
     start: Finite = 0.0
     stop: Finite
-    samples: int | None = None
+    samples: Samples | None = None
     rate: Finite | None = None
 
     @model_validator(mode="after")
     def _one_of(self) -> Window:
         if (self.samples is None) == (self.rate is None):
             raise ValueError("give exactly one of samples and rate")
+        if self.rate is not None and (self.stop - self.start) * self.rate >= MAX_SAMPLES:
+            raise ValueError(f"rate = {self.rate:g} Hz makes more samples than allowed: {MAX_SAMPLES}")
         return self
 
 
@@ -78,7 +90,7 @@ class CycleMotion(Strict):
     overlap: Finite = 0.0
     back: bool = False
     law: str = "quintic"
-    samples: int | None = None
+    samples: Samples | None = None
     rate: Finite | None = None
 
 
@@ -106,7 +118,7 @@ class CandidateSpec(Strict):
 class CaseSpec(Strict):
     """One robot on one motion."""
 
-    name: Annotated[str, Field(pattern=NAME)]
+    name: Name
     title: str = ""
     description: str = ""
     motion: Motion
@@ -119,17 +131,27 @@ class Measure(Strict):
 
     quantity: Literal[
         "peak_speed", "peak_acceleration", "mobility", "rank", "peak_error", "rms_error", "pointwise_error",
+        "solution_distance",
     ]  # fmt: skip
     case: str
     candidate: str | None = None
     reference: str | None = None
     joint: str | None = None
+    point: Triple | None = None
+    """for ``solution_distance``: a platform position, m; measured is the largest coordinate difference from the nearest
+    solution of the forward position problem at the case's first sample"""
+
+    @model_validator(mode="after")
+    def _point_where_needed(self) -> Measure:
+        if (self.quantity == "solution_distance") != (self.point is not None):
+            raise ValueError("point goes with quantity solution_distance, and only with it")
+        return self
 
 
 class ClaimSpec(Strict):
     """A figure that a paper prints, and how it is measured here."""
 
-    id: str
+    id: Name
     text: str
     source: str
     kind: Literal["upper", "value"]
@@ -144,7 +166,7 @@ class ClaimSpec(Strict):
 class FigureSpec(Strict):
     """A figure of the paper, redrawn."""
 
-    id: str
+    id: Name
     title: str
     case: str
     kind: Literal["platform", "platform_velocity", "platform_acceleration", "torque"]
@@ -152,12 +174,18 @@ class FigureSpec(Strict):
     curves: list[str] = []
     source: str = ""
 
+    @model_validator(mode="after")
+    def _torque(self) -> FigureSpec:
+        if self.kind == "torque" and (self.joint is None or not self.curves):
+            raise ValueError("a figure of kind torque needs joint and curves")
+        return self
+
 
 class Campaign(Strict):
     """A whole campaign file."""
 
     format: Literal[1] = FORMAT
-    name: Annotated[str, Field(pattern=NAME)]
+    name: Name
     title: str
     description: str = ""
     model: str
@@ -189,13 +217,16 @@ def load_campaign(path: str | Path) -> tuple[Campaign, Path]:
     """
     found = _find(Path(path))
     try:
-        document = tomllib.loads(found.read_text(encoding="utf-8"))
+        # -sig: some editors begin UTF-8 files with a byte order mark
+        document = tomllib.loads(found.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise SpecError(f"{path}: {error.strerror or error}", file=str(path)) from error
     except UnicodeDecodeError as error:
         raise SpecError(f"{path}: not UTF-8 text (byte {error.start})", file=str(path)) from error
     except tomllib.TOMLDecodeError as error:
         raise SpecError(f"{path}: not valid TOML: {error}", file=str(path)) from error
+    except RecursionError as error:
+        raise SpecError(f"{path}: not valid TOML: nested too deeply", file=str(path)) from error
     try:
         campaign = Campaign.model_validate(document)
     except ValidationError as error:
@@ -205,8 +236,13 @@ def load_campaign(path: str | Path) -> tuple[Campaign, Path]:
 
 
 def _find(path: Path) -> Path:
-    if path.is_file():
-        return path
+    try:
+        if path.is_file():
+            return path
+        if path.is_dir():
+            raise SpecError(f"{path}: is a directory; a campaign is a TOML file", file=str(path))
+    except OSError as error:  # a name longer than the system allows
+        raise SpecError(f"{shorten(str(path))}: {error.strerror or error}", file=str(path)) from error
     if path.parts and (len(path.parts) == 1 or path.parts[0] == "campaigns"):
         try:
             return bundled("campaigns", path.name)
@@ -226,10 +262,28 @@ def _first(error: ValidationError, document: dict[str, Any]) -> str:
         return f'{where}: unknown key{did_you_mean(key, _valid_keys(issue["loc"]))}'
     if issue["type"] == "missing":
         return f"{where}: missing; this key is required"
-    value = repr(issue["input"])
-    shown = value if len(value) <= 60 else value[:57] + "..."
-    message = issue["msg"].removeprefix("Value error, ")
-    return f"{where} = {shown}: {message[0].lower()}{message[1:]}"
+    if issue["type"].startswith("union_tag"):
+        return f'{where}.kind{_wrong_kind(issue["input"])}'
+    if issue["type"] == "string_pattern_mismatch":
+        return f"{where} = {shorten(repr(issue['input']))}; {NAME_RULE}"
+    message = issue["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    # a whole table or list says less than its key
+    shown = "" if isinstance(issue["input"], dict | list) else f" = {shorten(repr(issue['input']))}"
+    return f"{where}{shown}: {message[0].lower()}{message[1:]}"
+
+
+def _wrong_kind(motion: Any) -> str:
+    if not isinstance(motion, dict):
+        return ": missing; a motion is a table with kind and its own keys"
+    if "kind" not in motion:
+        return f": missing; valid: {', '.join(_MOTIONS)}"
+    kind = str(motion["kind"])
+    return f" = {shorten(repr(kind))}: unknown kind of motion{did_you_mean(kind, _MOTIONS)}"
+
+
+def shorten(text: str) -> str:
+    """Cut a text that a message repeats."""
+    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
 
 
 _MOTIONS: dict[str, type[Strict]] = {
@@ -259,7 +313,7 @@ def _place(place: list[int | str], document: Any) -> str:
             node = None
         if isinstance(part, int):
             name = next((node[k] for k in ("name", "id") if isinstance(node, dict) and isinstance(node.get(k), str)), "")
-            text += f' "{name}"' if name else f"[{part + 1}]"
+            text += f' "{shorten(name)}"' if name else f"[{part + 1}]"
         else:
             text += f".{part}" if text else str(part)
     return text
@@ -279,7 +333,36 @@ def _check_names(campaign: Campaign, file: str) -> None:
         if rows.count(row) > 1:
             raise SpecError(f'{file}: candidate "{row[0]}" against "{row[1]}" stands twice', file=file)
     for kind, items in (("claim", campaign.claim), ("figure", campaign.figure)):
+        ids = [item.id for item in items]
         for item in items:
+            if ids.count(item.id) > 1:
+                raise SpecError(f'{file}: two {kind}s have the id "{item.id}"', file=file)
             case = item.measure.case if isinstance(item, ClaimSpec) else item.case
             if case not in cases:
                 raise SpecError(f'{file}: {kind} "{item.id}" names case "{case}"{did_you_mean(case, cases)}', file=file)
+    for claim in campaign.claim:
+        _check_measure(claim, rows, file)
+    curves = [f"cand:{name}" for name, _ in rows] + [f"ref:{reference}" for _, reference in rows]
+    for figure in campaign.figure:
+        for curve in figure.curves:
+            if curve not in curves:
+                hint = did_you_mean(curve, set(curves))
+                raise SpecError(f'{file}: figure "{figure.id}": no curve "{shorten(curve)}"{hint}', file=file)
+
+
+def _check_measure(claim: ClaimSpec, rows: list[tuple[str, str]], file: str) -> None:
+    """A claim about an error has to name a candidate and a reference that the campaign compares."""
+    measure = claim.measure
+    named = [value for value in (measure.candidate, measure.reference, measure.joint) if value is not None]
+    if not measure.quantity.endswith("_error"):
+        if named:
+            raise SpecError(f'{file}: claim "{claim.id}": {measure.quantity} belongs to a case, not to "{named[0]}"')
+        return
+    found = [row for row in rows if measure.candidate in (None, row[0]) and measure.reference in (None, row[1])]
+    if not found:
+        valid = ", ".join(f'"{name}" against "{reference}"' for name, reference in rows)
+        raise SpecError(
+            f'{file}: claim "{claim.id}": no candidate "{measure.candidate or "any"}" against'
+            f' "{measure.reference or "any"}"; valid: {valid}',
+            file=file,
+        )

@@ -12,7 +12,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,8 @@ MANIFEST = "manifest.json"
 SUMMARY = "summary.csv"
 SERIES = "series"
 REPORTS = ("report.html", "report.md", "figures")
+IGNORED = (".DS_Store", "Thumbs.db", "desktop.ini")
+"""files that file managers leave everywhere"""
 
 
 def check_output(directory: Path) -> None:
@@ -36,28 +38,58 @@ def check_output(directory: Path) -> None:
     Raises
     ------
     OutputError
-        Not a directory, not writable, or a directory that holds something else than a run.
+        Not a directory, not writable, or a directory that holds something else than a run: it would be lost.
     """
-    if directory.exists():
-        if not directory.is_dir():
-            raise OutputError(f"{directory}: exists and is not a directory", path=str(directory))
-        if any(directory.iterdir()) and not (directory / MANIFEST).is_file():
-            raise OutputError(
-                f"{directory}: holds files that are no run of the workbench (no {MANIFEST}); name an empty or new one",
-                path=str(directory),
-            )
-    parent = _existing_parent(directory)
-    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
-        raise OutputError(f"{directory}: {parent} is not a directory that can be written", path=str(directory))
-    if directory.exists() and not os.access(directory, os.W_OK | os.X_OK):
+    try:
+        place = directory.resolve()
+        if place.exists():
+            _check_existing(directory, place)
+        parent = place.parent
+        while not parent.exists():
+            parent = parent.parent
+    except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: links in a circle
+        raise _refused(directory, error) from error
+    if not parent.is_dir():
+        raise OutputError(f"{directory}: {parent} is not a directory", path=str(directory))
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise OutputError(f"{directory}: {parent} cannot be written", path=str(directory))
+
+
+def _check_existing(directory: Path, place: Path) -> None:
+    if not place.is_dir():
+        raise OutputError(f"{directory}: exists and is not a directory", path=str(directory))
+    if Path.cwd().is_relative_to(place):
+        raise OutputError(
+            f"{directory}: holds the current directory, which a run would replace; name another", path=str(directory)
+        )
+    found = sorted(entry.name for entry in place.iterdir())
+    if found and not _is_run(place / MANIFEST):
+        raise OutputError(
+            f"{directory}: holds files that are no run of the workbench, such as {found[0]}; name an empty or new one",
+            path=str(directory),
+        )
+    strangers = [name for name in found if name not in (MANIFEST, SUMMARY, SERIES, *REPORTS, *IGNORED)]
+    if strangers:
+        raise OutputError(
+            f"{directory}: {strangers[0]} is no part of a run and would be lost; move it away or name another directory",
+            path=str(directory),
+        )
+    if not os.access(place, os.W_OK | os.X_OK):
         raise OutputError(f"{directory}: cannot be written", path=str(directory))
 
 
-def _existing_parent(directory: Path) -> Path:
-    parent = directory.absolute().parent
-    while not parent.exists():
-        parent = parent.parent
-    return parent
+def _is_run(manifest: Path) -> bool:
+    """Tell a run's manifest from other files of that common name."""
+    try:
+        content = json.loads(manifest.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(content, dict) and {"format", "campaign", "cases"} <= content.keys()
+
+
+def _refused(directory: Path, error: Exception) -> OutputError:
+    reason = error.strerror if isinstance(error, OSError) else None
+    return OutputError(f"{directory}: cannot be written: {reason or error}", path=str(directory))
 
 
 @contextmanager
@@ -69,34 +101,51 @@ def staged(directory: Path) -> Iterator[Path]:
     OutputError
         The system refuses a write, with its own reason.
     """
-    directory = directory.absolute()
+    made: list[Path] = []
     try:
-        directory.parent.mkdir(parents=True, exist_ok=True)
-        stage = Path(tempfile.mkdtemp(prefix=f".{directory.name}.", dir=directory.parent))
-    except OSError as error:
-        raise OutputError(f"{directory}: cannot be written: {error.strerror or error}", path=str(directory)) from error
+        place = directory.resolve()
+        made = _make_parents(place)
+        stage = Path(tempfile.mkdtemp(prefix=f".{place.name[:100]}.", dir=place.parent))
+    except (OSError, RuntimeError, ValueError) as error:
+        _remove_empty(made)
+        raise _refused(directory, error) from error
     try:
         stage.chmod(0o755)
         yield stage
-        _replace(stage, directory)
+        _replace(stage, place)
     except OSError as error:
-        raise OutputError(f"{directory}: cannot be written: {error.strerror or error}", path=str(directory)) from error
+        raise _refused(directory, error) from error
     finally:
         shutil.rmtree(stage, ignore_errors=True)
+        _remove_empty(made)
+
+
+def _make_parents(place: Path) -> list[Path]:
+    """Make what is missing above *place*; return it, innermost first."""
+    missing = [parent for parent in place.parents if not parent.exists()]
+    place.parent.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def _remove_empty(made: list[Path]) -> None:
+    for parent in made:
+        with suppress(OSError):  # it holds a finished run
+            parent.rmdir()
 
 
 def _replace(stage: Path, directory: Path) -> None:
     if not directory.exists():
         stage.rename(directory)
         return
-    old = Path(tempfile.mkdtemp(prefix=f".{directory.name}.old.", dir=directory.parent))
-    directory.rename(old / directory.name)
+    old = Path(tempfile.mkdtemp(prefix=f".{directory.name[:100]}.old.", dir=directory.parent))
+    aside = old / "run"
     try:
+        directory.rename(aside)
         stage.rename(directory)
-    except OSError:
-        (old / directory.name).rename(directory)
-        raise
     finally:
+        # also after Ctrl-C between the two: the old run goes back
+        if aside.exists() and not directory.exists():
+            aside.rename(directory)
         shutil.rmtree(old, ignore_errors=True)
 
 

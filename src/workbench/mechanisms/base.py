@@ -86,6 +86,20 @@ class UniformRule:
     unless: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Condition:
+    """One inequality that a paper states, evaluated over a motion."""
+
+    name: str
+    value: float
+    relation: str
+    """``>`` or ``<``: what the paper demands of value and limit"""
+    limit: float
+    holds: bool
+    unit: str
+    note: str = ""
+
+
 CandidateFunction = Callable[["Mechanism", FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 
 
@@ -184,6 +198,18 @@ class Mechanism(ABC):
     @abstractmethod
     def singularity_measures(self, q: ArrayLike) -> dict[str, FloatArray]:
         """Determinants that vanish at singular poses, name -> ``(n,)``, scaled to be dimensionless (1 is far away)."""
+
+    def assembly_solutions(self, q: ArrayLike) -> FloatArray:
+        """Platform positions of every assembly branch, ``(n, k, 3)``; here the home branch alone, k = 1."""
+        return self.forward_kinematics(q)[:, None, :]
+
+    def mobility_count(self) -> dict[str, int]:
+        """Freedoms counted on paper, by the formula that the mechanism's source uses; name -> number, may be empty."""
+        return {}
+
+    def paper_conditions(self, q: ArrayLike) -> tuple[Condition, ...]:
+        """Conditions that the mechanism's source states against singular poses, over a motion ``(n, na)``."""
+        return ()
 
     def warnings(self, t: FloatArray, q: FloatArray) -> list[str]:
         """What a reader of a case's results should know: poses near a singularity, lengths that look like millimetres.

@@ -16,7 +16,7 @@ from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.errors import MotionError
 from workbench.mechanisms import planar_4rprp_kernel as kernel
 from workbench.mechanisms import planar_4rprp_screws as screw_route
-from workbench.mechanisms.base import Candidate, Mechanism, ParameterInfo, Target, UniformRule
+from workbench.mechanisms.base import Candidate, Condition, Mechanism, ParameterInfo, Target, UniformRule
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.planar_4rprp_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
 
@@ -181,6 +181,34 @@ class Planar4Rprp(Mechanism):
         x = self._solve(array)
         self._refuse_unreachable(array, x)
         return self._measures(array, x)
+
+    def assembly_solutions(self, q: ArrayLike) -> FloatArray:
+        """All four solutions of the forward position problem, ``(n, 4, 3)``, in Table 2's order."""
+        return self.forward_kinematics_all(q)
+
+    def mobility_count(self) -> dict[str, int]:
+        """Gogu's count, [GarciaMurillo2016] eq. (1)-(8), each dimension from the rank of screws."""
+        from workbench.mechanisms.planar_4rprp_mobility import gogu_mobility  # noqa: PLC0415 - it imports this module
+
+        count = gogu_mobility(self._parameters)
+        return {"joints p": count.p, "lost joint parameters r": count.r, "mobility M = p - r": count.mobility}
+
+    def paper_conditions(self, q: ArrayLike) -> tuple[Condition, ...]:
+        """Section 5's conditions on the limb lengths and Figure 7's, which are neither necessary nor sufficient."""
+        from workbench.mechanisms.planar_4rprp_singularity import paper_singularity_conditions  # noqa: PLC0415
+
+        return tuple(
+            Condition(
+                name=condition.name,
+                value=condition.value,
+                relation=condition.relation,
+                limit=condition.limit,
+                holds=condition.holds,
+                unit=condition.unit,
+                note="" if condition.printed else "asked for by the text, not printed",
+            )
+            for condition in paper_singularity_conditions(self, q)
+        )
 
     def condition_number(self, q: ArrayLike) -> FloatArray:
         """Condition number of J_r in the 2-norm, ``(n,)``: 1 is isotropic, infinity singular."""
