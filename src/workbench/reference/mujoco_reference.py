@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -18,7 +19,7 @@ from workbench.reference.closure import Assembly, LoopCloser
 from workbench.reference.engine import Engine, mass_layout, without_bar_inertia
 from workbench.reference.kernels import projection, velocities
 from workbench.reference.reactions import joint_reactions
-from workbench.reference.structure import read_structure
+from workbench.reference.structure import Structure, read_structure
 
 MASS_MODELS = ("distributed", "lumped")
 
@@ -107,6 +108,33 @@ class MujocoReference:
     def joint_names(self) -> tuple[str, ...]:
         """Actuated joints, in actuator order."""
         return self._structure.joint_names
+
+    @property
+    def text(self) -> str:
+        """The MJCF with the overrides written into it."""
+        return self._text
+
+    @property
+    def structure(self) -> Structure:
+        """Tables of actuated and passive freedoms and of loop closures."""
+        return self._structure
+
+    @property
+    def base_rotation(self) -> FloatArray:
+        """``(3, 3)``: world vector = base_rotation @ vector in the paper's frame."""
+        return self._base_rotation.copy()
+
+    def compiled(self, mass_model: str = "distributed") -> mujoco.MjModel:
+        """MuJoCo's model under a mass assumption; to be read, not written.
+
+        Raises
+        ------
+        ParameterError
+            Unknown mass model.
+        ModelError
+            The file does not say which bars lose their inertia in the lumped model.
+        """
+        return self._engine(mass_model).model
 
     def mobility(self) -> Mobility:
         """Count freedoms and redundant rows by rank at the home pose."""
@@ -215,8 +243,6 @@ class MujocoReference:
         return self._closed[1]
 
     def _locate_base(self) -> None:
-        import mujoco  # noqa: PLC0415
-
         model = self._engines["distributed"].model
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
