@@ -1,0 +1,274 @@
+"""Loop closure: every sample on the home branch in whatever order it comes, or an error that names it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import workbench as wb
+from robots import MODEL, FourBar, sine_sum, table_1, write_model
+from workbench.errors import ModelError, MotionError
+from workbench.mechanisms.base import Mechanism
+from workbench.reference import ReferenceResult
+
+SAME = 1e-12
+CONNECT = '<connect name="loop" site1="coupler_tip" site2="rocker_tip"/>'
+
+
+def four_bar(folder: Path, branch: int = 1, **options: str) -> wb.MujocoReference:
+    model = FourBar(branch)
+    options = {"equality": CONNECT, "home": model.home()} | options
+    return wb.MujocoReference(write_model(folder, model.bodies(), **options))
+
+
+def at_rest(reference: wb.MujocoReference, q: np.ndarray) -> ReferenceResult:
+    return reference.inverse_dynamics(q, np.zeros_like(q), np.zeros_like(q))
+
+
+# --- order and branch -------------------------------------------------------------------------------------------------
+
+
+def test_scattered_samples_close_as_a_trajectory_does() -> None:
+    q, qd, qdd = sine_sum(np.random.default_rng(3), np.linspace(0.0, 2.0, 150), 0.9)
+    order = np.random.default_rng(4).permutation(len(q))
+    along = wb.MujocoReference(MODEL).inverse_dynamics(q, qd, qdd)
+    scattered = wb.MujocoReference(MODEL).inverse_dynamics(q[order], qd[order], qdd[order])
+    assert np.abs(scattered.x - along.x[order]).max() < SAME
+    # the spin of a rod about its own axis depends on the way; all else does not
+    model = mujoco.MjModel.from_xml_path(str(MODEL))
+    fixed = [model.jnt_qposadr[j] for j in range(model.njnt) if model.jnt_type[j] != mujoco.mjtJoint.mjJNT_BALL]
+    assert np.abs(scattered.qpos[:, fixed] - along.qpos[order][:, fixed]).max() < SAME
+    assert np.abs(scattered.tau - along.tau[order]).max() < SAME * np.abs(along.tau).max()
+    assert np.abs(scattered.tau - along.tau).max() > 1e-3 * np.abs(along.tau).max()
+
+
+def test_single_samples_far_from_home_keep_the_branch_of_the_closed_form() -> None:
+    mech, reference = table_1(), wb.MujocoReference(MODEL)
+    rng = np.random.default_rng(7)
+    q = np.array([0.0, 0.8, 0.8]) + rng.uniform(-1, 1, (400, 3)) * [0.2, 0.7, 0.7]
+    inside = [i for i in range(len(q)) if _measures(mech, q[i : i + 1]) > 0.15]
+    assert len(inside) > 150
+    res = at_rest(reference, q[inside])
+    assert np.abs(res.x - mech.forward_kinematics(q[inside])).max() < SAME * 100
+    assert res.closure_residual.max() <= 1e-13
+    for i in inside[:20]:
+        assert np.abs(at_rest(reference, q[i : i + 1]).x - mech.forward_kinematics(q[i : i + 1])).max() < SAME * 100
+
+
+def _measures(mech: Mechanism, q: np.ndarray) -> float:
+    try:
+        return float(min(np.abs(v).min() for v in mech.singularity_measures(q).values()))
+    except MotionError:
+        return 0.0
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("scattered", [False, True])
+def test_both_assembly_branches_of_a_four_bar(tmp_path: Path, branch: int, scattered: bool) -> None:
+    q = np.linspace(-3.0, 3.0, 200)  # nearly a full turn of the crank
+    if scattered:
+        q = np.random.default_rng(1).permutation(q)
+    res = at_rest(four_bar(tmp_path, branch), q[:, None])
+    poses = FourBar(branch).poses(q)
+    assert np.abs(res.x[:, [0, 2]] - poses[:, 3, :2]).max() < SAME
+    assert np.abs(res.x[:, 1]).max() < SAME
+    other = FourBar(-branch).poses(q)
+    assert np.abs(res.x[:, [0, 2]] - other[:, 3, :2]).min(axis=0).max() > 1e-3
+
+
+def test_one_sample_asked_for_alone_is_where_it_is_among_others(tmp_path: Path) -> None:
+    q = np.linspace(-3.0, 3.0, 61)[:, None]
+    together = at_rest(four_bar(tmp_path), q)
+    fresh = four_bar(tmp_path)
+    for i in (0, 17, 60):
+        assert np.abs(at_rest(fresh, q[i : i + 1]).qpos - together.qpos[i]).max() < SAME
+
+
+# --- what cannot be closed --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("place", [0, 5, 30])
+def test_a_sample_out_of_reach_is_named(tmp_path: Path, place: int) -> None:
+    # a rocker that cannot follow: the crank stops where coupler and rocker are in line
+    model = FourBar()
+    model.rocker = 0.12
+    path = write_model(tmp_path, model.bodies(), CONNECT, home=model.home(0.3))
+    limit = np.arccos((0.3**2 + 0.1**2 - 0.37**2) / (2 * 0.3 * 0.1))
+    q = np.random.default_rng(2).uniform(0.0, 0.97 * limit, (40, 1))
+    at_rest(wb.MujocoReference(path), q)
+    q[place] = 1.03 * limit
+    with pytest.raises(MotionError, match=f"^sample {place}, joint q: the loops cannot be closed at q = ") as caught:
+        at_rest(wb.MujocoReference(path), q)
+    assert caught.value.facts["sample"] == place
+
+
+def test_a_robot_sample_out_of_reach_is_named() -> None:
+    q = np.tile([0.0, np.pi / 4, np.pi / 4], (30, 1))
+    q[11, 0] = 0.31
+    with pytest.raises(MotionError, match=r"^sample 11, joint q1: the loops cannot be closed"):
+        at_rest(wb.MujocoReference(MODEL), q)
+
+
+def test_loops_that_cannot_close_at_all_are_refused(tmp_path: Path) -> None:
+    model = FourBar()
+    home = model.home()
+    model.rocker = 0.05
+    with pytest.raises(ModelError, match=r'cannot be closed from the home pose; equality "loop"'):
+        wb.MujocoReference(write_model(tmp_path, model.bodies(), CONNECT, home=home))
+
+
+def test_a_pose_where_the_actuator_loses_the_mechanism_is_refused(tmp_path: Path) -> None:
+    model = FourBar()
+    model.rocker = 0.12
+    path = write_model(tmp_path, model.bodies(), CONNECT, home=model.home(0.3))
+    limit = np.arccos((0.3**2 + 0.1**2 - 0.37**2) / (2 * 0.3 * 0.1))
+    with pytest.raises(MotionError, match=r"^sample 1, joint"):
+        at_rest(wb.MujocoReference(path), np.array([[0.3], [limit]]))
+
+
+# --- freedoms ---------------------------------------------------------------------------------------------------------
+
+PENDULUM = """<body name="upper"><joint name="q" axis="0 1 0"/>
+  <inertial pos="0 0 -.3" mass="1" diaginertia=".01 .01 .001"/>
+  <body name="lower" pos="0 0 -.6"><joint name="q_lower" axis="0 1 0"/>
+    <inertial pos="0 0 -.2" mass=".7" diaginertia=".01 .01 .001"/><site name="P" pos="0 0 -.4"/></body></body>"""
+
+
+def test_a_freedom_that_no_actuator_holds_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r'1 freedom\(s\) that no actuator holds, most of it in joint "q_lower"'):
+        wb.MujocoReference(write_model(tmp_path, PENDULUM))
+    wb.MujocoReference(write_model(tmp_path, PENDULUM, motors=("q", "q_lower")))
+
+
+def test_redundant_constraints_do_no_harm(tmp_path: Path) -> None:
+    q = np.linspace(0.2, 1.5, 20)[:, None]
+    once = four_bar(tmp_path)
+    twice = four_bar(tmp_path, equality=CONNECT + CONNECT.replace('"loop"', '"again"'))
+    assert (once.mobility().mobility, once.mobility().rank, once.mobility().redundant_rows) == (1, 2, 1)
+    assert (twice.mobility().mobility, twice.mobility().rank, twice.mobility().redundant_rows) == (1, 2, 4)
+    one, two = (r.inverse_dynamics(q, 1 + q, q) for r in (once, twice))
+    assert np.abs(one.qpos - two.qpos).max() < SAME
+    assert np.abs(one.tau - two.tau).max() < SAME * np.abs(one.tau).max()
+    # least norm: the doubled joint carries half the force at each place
+    assert np.abs(two.reactions["loop"] - two.reactions["again"]).max() < 1e-10
+    assert np.abs(two.reactions["loop"] * 2 - one.reactions["loop"]).max() < 1e-10
+
+
+def test_mobility_of_the_robot() -> None:
+    mobility = wb.MujocoReference(MODEL).mobility()
+    assert (mobility.mobility, mobility.rank, mobility.redundant_rows, mobility.idle_freedoms) == (3, 8, 1, 2)
+
+
+# --- joint equalities -------------------------------------------------------------------------------------------------
+
+
+def test_a_gear_follows_its_polynomial(tmp_path: Path) -> None:
+    equality = '<joint joint1="q_lower" joint2="q" polycoef="0.1 -2 0.3 0.05 0.01"/>'
+    q = np.linspace(-1.0, 1.0, 9)[:, None]
+    res = wb.MujocoReference(write_model(tmp_path, PENDULUM, equality)).inverse_dynamics(q, 0 * q + 1.5, 0 * q - 0.7)
+    y = q[:, 0]
+    assert np.abs(res.qpos[:, 1] - np.polyval([0.01, 0.05, 0.3, -2, 0.1], y)).max() < SAME
+    first, second = np.polyval([0.04, 0.15, 0.6, -2], y), np.polyval([0.12, 0.3, 0.6], y)
+    assert np.abs(res.qvel[:, 1] - 1.5 * first).max() < SAME
+    assert np.abs(res.qacc[:, 1] - (-0.7 * first + 1.5**2 * second)).max() < SAME
+    assert np.abs(res.qacc[:, 1] - (-0.7 * first)).max() > 0.1
+
+
+def test_a_joint_equality_alone_holds_the_joint_still(tmp_path: Path) -> None:
+    reference = wb.MujocoReference(write_model(tmp_path, PENDULUM, '<joint joint1="q_lower" polycoef="0.4 0 0 0 0"/>'))
+    q = np.linspace(-1.0, 1.0, 5)[:, None]
+    res = reference.inverse_dynamics(q, 1 + q, q)
+    assert np.abs(res.qpos[:, 1] - 0.4).max() < SAME
+    assert np.abs(res.qvel[:, 1]).max() == 0.0
+
+
+@pytest.mark.xfail(strict=True, reason="the polynomial counts from zero, MuJoCo counts from the reference positions")
+def test_a_gear_counts_from_the_joints_reference_positions_as_mujoco_does(tmp_path: Path) -> None:
+    bodies = PENDULUM.replace('name="q" axis', 'name="q" ref="0.3" axis')
+    bodies = bodies.replace('name="q_lower" axis', 'name="q_lower" ref="-0.4" axis')
+    path = write_model(tmp_path, bodies, '<joint joint1="q_lower" joint2="q" polycoef="0.1 2 0.3 0 0"/>')
+    q = np.linspace(-0.5, 0.9, 5)[:, None]
+    res = at_rest(wb.MujocoReference(path), q)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    for qpos in res.qpos:
+        data.qpos = qpos
+        mujoco.mj_forward(model, data)
+        assert np.abs(data.efc_pos).max() < SAME
+    assert np.abs(res.qpos[:, 1] + 0.4 - np.polyval([0.3, 2, 0.1], q[:, 0] - 0.3)).max() < SAME
+
+
+# --- welds ------------------------------------------------------------------------------------------------------------
+
+
+def welded(folder: Path, quat: str, other: str, model: FourBar | None = None) -> Path:
+    """The four-bar with its last hinge on a stub at the rocker's tip, and the stub welded to the coupler."""
+    model = model or FourBar()
+    stub = f"""<body name="stub" pos="{model.rocker} 0 0"><joint name="q_stub" axis="0 -1 0"/>
+      <inertial pos="0 0 0" mass="0.3" diaginertia="0.002 0.002 0.002"/><site name="stub" quat="{other}"/></body>"""
+    bodies = model.bodies().replace('<site name="rocker_tip"', stub + '<site name="rocker_tip"')
+    bodies = bodies.replace('<site name="coupler_tip"', f'<site name="coupler_tip" quat="{quat}"')
+    phi, psi = model.angles(np.array([0.9]))
+    home = f"{model.home()} {phi[0] - psi[0]}"
+    return write_model(folder, bodies, '<weld name="loop" site1="coupler_tip" site2="stub"/>', home=home)
+
+
+TILTED = "0.5 -0.3 0.7 0.2"
+
+
+def test_a_weld_keeps_place_and_turn(tmp_path: Path) -> None:
+    path = welded(tmp_path, TILTED, TILTED)
+    q = np.random.default_rng(5).uniform(-3.0, 3.0, 50)
+    res = wb.MujocoReference(path).inverse_dynamics(q[:, None], 1 + q[:, None], q[:, None])
+    assert res.closure_residual.max() <= 1e-13
+    assert res.velocity_residual.max() < SAME
+    assert res.acceleration_residual.max() < SAME * 100
+    phi, psi = FourBar().angles(q)
+    stub = res.qpos[:, 3] - (phi - psi)
+    assert np.abs(stub - 2 * np.pi * np.round(stub / (2 * np.pi))).max() < SAME
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    for qpos in res.qpos:
+        data.qpos = qpos
+        mujoco.mj_kinematics(model, data)
+        one, two = (data.site(name) for name in ("coupler_tip", "stub"))
+        assert np.abs(one.xpos - two.xpos).max() < SAME
+        assert np.abs(one.xmat - two.xmat).max() < SAME
+
+
+def test_a_weld_between_frames_that_differ_turns_the_stub(tmp_path: Path) -> None:
+    turn = 0.3  # about -y, the hinges' axis
+    path = welded(tmp_path, "1 0 0 0", f"{np.cos(turn / 2)} 0 {-np.sin(turn / 2)} 0")
+    q = np.array([[0.9], [0.5]])
+    phi, psi = FourBar().angles(q[:, 0])
+    res = at_rest(wb.MujocoReference(path), q)
+    assert np.abs(res.qpos[:, 3] - (phi - psi - turn)).max() < SAME
+
+
+def test_a_weld_that_would_need_a_turn_out_of_the_plane_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="cannot be closed from the home pose"):
+        wb.MujocoReference(welded(tmp_path, "1 0 0 0", f"{np.cos(0.01)} {np.sin(0.01)} 0 0"))
+
+
+# --- idle spin --------------------------------------------------------------------------------------------------------
+
+
+def test_a_rod_between_two_ball_joints_does_not_spin() -> None:
+    q, qd, qdd = sine_sum(np.random.default_rng(8), np.linspace(0.0, 1.0, 40), 0.9)
+    res = wb.MujocoReference(MODEL).inverse_dynamics(q, qd, qdd)
+    model = mujoco.MjModel.from_xml_path(str(MODEL))
+    data = mujoco.MjData(model)
+    velocity = np.zeros(6)
+    across = 0.0
+    for qpos, qvel in zip(res.qpos, res.qvel, strict=True):
+        data.qpos, data.qvel = qpos, qvel
+        mujoco.mj_forward(model, data)
+        for side in ("left", "right"):
+            body = data.body(f"rod_{side}")
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body.id, velocity, 1)
+            assert abs(velocity[2]) < SAME * 100  # the rod's axis is its own z
+            across = max(across, np.abs(velocity[:2]).max())
+    assert across > 1.0
