@@ -6,37 +6,46 @@ robot. Overrides are written into the text (in memory) and compiled again.
 
 from __future__ import annotations
 
-import dataclasses
-import math
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from workbench.data_files import bundled
-from workbench.errors import ModelError, did_you_mean
+from workbench.errors import ModelError, ParameterError, WorkbenchError, did_you_mean
 from workbench.mechanisms import MECHANISMS, mechanism_class
-from workbench.mechanisms.base import Mechanism, Target, changed_parameters, check_parameters
-from workbench.mjcf_text import find, replace_numbers, scan
+from workbench.mechanisms.base import Mechanism, changed_parameters
+from workbench.mjcf_assumptions import Context, refuse_broken
+from workbench.mjcf_safety import MAX_BYTES, read_text
+from workbench.mjcf_text import Element, scan
+from workbench.mjcf_values import read_parameters, rewrite
 
-ALIGNMENT = 1e-12
-"""Largest deviation (metres, kilograms, kg m^2, relative to the larger of 1 and the value) that still counts as on the
-axis or equal: above it the closed form would describe another robot."""
+__all__ = [
+    "MAX_BYTES",
+    "LoadedModel",
+    "compile_text",
+    "custom_text",
+    "edit_text",
+    "find_model",
+    "load_mechanism",
+    "load_model",
+    "open_model",
+    "read_parameters",
+    "read_text",
+]
 
-MAX_BYTES = 10_000_000
-"""A model larger than this is refused before it is parsed."""
+LARGEST_NUMBER = 1e10
+"""MuJoCo's own bound on positions and velocities; beyond it a simulation counts as diverged."""
 
-FIELDS = {
-    ("body", "pos"): (mujoco.mjtObj.mjOBJ_BODY, "body_pos"),
-    ("inertial", "pos"): (mujoco.mjtObj.mjOBJ_BODY, "body_ipos"),
-    ("inertial", "mass"): (mujoco.mjtObj.mjOBJ_BODY, "body_mass"),
-    ("site", "pos"): (mujoco.mjtObj.mjOBJ_SITE, "site_pos"),
-    ("joint", "pos"): (mujoco.mjtObj.mjOBJ_JOINT, "jnt_pos"),
-    ("joint", "damping"): (mujoco.mjtObj.mjOBJ_JOINT, "dof_damping"),
-}
-"""Where the compiled model keeps an attribute."""
+FINITE = (
+    "qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
+    "site_pos", "site_quat", "dof_damping", "dof_armature", "dof_frictionloss", "jnt_stiffness", "eq_data", "key_qpos",
+)  # fmt: skip
+"""Compiled arrays that every result depends on."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +56,12 @@ class LoadedModel:
     text: str
     model: mujoco.MjModel
     mechanism: Mechanism | None
+    kind: type[Mechanism] | None = None
+    """the mechanism's class, known even where the model breaks its assumptions"""
+    values: Mapping[str, float] | None = None
+    """its parameters by stored name; None where they cannot be read"""
+    problem: str = ""
+    """why they cannot be read, one line"""
 
 
 def find_model(path: str | Path) -> Path:
@@ -58,33 +73,31 @@ def find_model(path: str | Path) -> Path:
         No such file.
     """
     path = Path(path)
-    if path.is_file():
-        return path
+    try:
+        if path.is_file():
+            return path
+        exists = path.exists()
+    except (OSError, ValueError) as error:  # a name too long, a null byte, a directory that may not be entered
+        raise ModelError(f"{str(path)!r}: {getattr(error, 'strerror', None) or error}", file=str(path)) from error
+    if exists:
+        kind = "a directory" if path.is_dir() else "no regular file"
+        raise ModelError(f"{path}: is {kind}; a model is an XML file", file=str(path))
     if path.parts[:1] == ("models",) and len(path.parts) == 2:
-        try:
+        with contextlib.suppress(WorkbenchError):  # the message below says it better
             return bundled("models", path.name)
-        except Exception:  # the message below says it better  # noqa: BLE001
-            pass
     raise ModelError(f"{path}: no such model file", file=str(path))
 
 
-def read_text(path: Path) -> str:
-    """Read an MJCF file.
-
-    Raises
-    ------
-    ModelError
-        Not a file, not readable, not UTF-8, or too large.
-    """
+@contextlib.contextmanager
+def engine_warnings() -> Iterator[list[str]]:
+    """Collect MuJoCo's warnings; left alone it prints them and writes a log file into the current directory."""
+    collected: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(collected.append)
     try:
-        raw = path.read_bytes()
-        if len(raw) > MAX_BYTES:
-            raise ModelError(f"{path}: {len(raw)} bytes; allowed: at most {MAX_BYTES}", file=str(path))
-        return raw.decode()
-    except OSError as error:
-        raise ModelError(f"{path}: {error.strerror or error}", file=str(path)) from error
-    except UnicodeDecodeError as error:
-        raise ModelError(f"{path}: not UTF-8 text (byte {error.start})", file=str(path)) from error
+        yield collected
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def compile_text(text: str, file: str) -> mujoco.MjModel:
@@ -93,12 +106,22 @@ def compile_text(text: str, file: str) -> mujoco.MjModel:
     Raises
     ------
     ModelError
-        MuJoCo's own message, which names the file's line.
+        MuJoCo's own message, which names the file's line; or a number that is not finite or beyond `LARGEST_NUMBER`.
     """
     try:
-        return mujoco.MjModel.from_xml_string(text)
-    except (ValueError, mujoco.FatalError) as error:
+        with engine_warnings():
+            model = mujoco.MjModel.from_xml_string(text)
+    except (ValueError, TypeError, MemoryError, mujoco.FatalError) as error:
         raise ModelError(f"{file}: MuJoCo does not compile it: {error}", file=file) from error
+    for name in FINITE:
+        values = getattr(model, name)
+        if values.size and not np.abs(values).max() <= LARGEST_NUMBER:
+            raise ModelError(
+                f"{file}: {name} of the compiled model holds {np.abs(values).max():g}; allowed: at most"
+                f" {LARGEST_NUMBER:g}",
+                file=file,
+            )
+    return model
 
 
 def custom_text(model: mujoco.MjModel, name: str) -> str | None:
@@ -127,28 +150,42 @@ def load_model(path: str | Path, overrides: Mapping[str, float] | None = None) -
     ParameterError
         An override that does not exist or has a value it may not have.
     """
-    found = find_model(path)
     file = str(path)
-    text = read_text(found)
-    scan(text, file)
+    text = read_text(find_model(path))
+    if not overrides:
+        return _load(text, file)
+    base = _read_once(text, file)
+    if base.kind is None or base.values is None:
+        raise ModelError(
+            f'{file}: parameters cannot be set, <custom> has no <text name="mechanism"> that says what they mean',
+            file=file,
+        )
+    wanted = changed_parameters(base.kind, base.values, overrides)
+    loaded = _load(rewrite(text, file, base.kind, base.values, wanted, base.elements), file)
+    confirm(loaded, wanted)
+    return loaded
+
+
+def open_model(path: str | Path) -> LoadedModel:
+    """Load an MJCF that may break the closed form's assumptions, to list them (`workbench.mjcf_assumptions`).
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read, is not safe, or does not compile; or it names an unknown mechanism.
+    """
+    file = str(path)
+    text = read_text(find_model(path))
+    elements = scan(text, file)
     model = compile_text(text, file)
-    name = custom_text(model, "mechanism")
-    if name is None:
-        if overrides:
-            raise ModelError(
-                f'{file}: parameters cannot be set, <custom> has no <text name="mechanism"> that says what they mean',
-                file=file,
-            )
+    kind = _kind(model, file)
+    if kind is None:
         return LoadedModel(file, text, model, None)
-    if name not in MECHANISMS:
-        raise ModelError(f'{file}: unknown mechanism "{name}"{did_you_mean(name, MECHANISMS)}', file=file)
-    mechanism = mechanism_class(name)
-    parameters = read_parameters(model, mechanism, file)
-    if overrides:
-        text = edit_text(text, file, mechanism, parameters, overrides)
-        model = compile_text(text, file)
-        parameters = read_parameters(model, mechanism, file)
-    return LoadedModel(file, text, model, mechanism(mechanism.parameter_type(**parameters)))
+    try:
+        values = read_parameters(model, kind, file, text, elements)
+        return LoadedModel(file, text, model, kind(kind.parameter_type(**values)), kind, values)
+    except (ModelError, ParameterError) as error:
+        return LoadedModel(file, text, model, None, kind, None, str(error))
 
 
 def load_mechanism(path: str | Path, **parameters: float) -> Mechanism:
@@ -195,112 +232,60 @@ def edit_text(
     ModelError, ParameterError
         A missing element, an unknown name, a value that is not allowed.
     """
-    new = changed_parameters(mechanism, values, changes)
-    edits = []
-    for target in mechanism.targets:
-        if any(new[name] != values[name] for name in target.of):
-            edits.append((target.element, target.name, target.attribute, target.index, _number(target, new)))
-    return replace_numbers(text, file, edits)
+    return rewrite(text, file, mechanism, values, changed_parameters(mechanism, values, changes))
 
 
-def _number(target: Target, values: Mapping[str, float]) -> float:
-    return target.factor * math.prod(values[name] for name in target.of)
-
-
-def read_parameters(model: mujoco.MjModel, mechanism: type[Mechanism], file: str) -> dict[str, float]:
-    """Read every parameter from the compiled model and check the numbers that have to follow from them.
+def confirm(loaded: LoadedModel, wanted: Mapping[str, float]) -> None:
+    """Refuse an edited model that does not give back, bit for bit, the parameters that were asked for.
 
     Raises
     ------
     ModelError
-        A missing element, a number off its axis, or two numbers that should agree and do not.
-    ParameterError
-        A value that the parameter may not have.
+        Naming the parameter: something in the file (a ``<compiler>`` option, a ``<frame>``) changes the numbers in it.
     """
-    values: dict[str, float] = {}
-    for target in sorted((t for t in mechanism.targets if t.reads), key=lambda t: len(t.of)):
-        found = _compiled(model, target, file)
-        assert target.reads is not None
-        others = math.prod(values[name] for name in target.of if name != target.reads)
-        values[target.reads] = _quotient(found / target.factor, others)
-    check_parameters(mechanism.parameter_table, values)
-    _check_numbers(model, mechanism, values, file)
-    return {f.name: values[f.name] for f in dataclasses.fields(mechanism.parameter_type)}
+    assert loaded.values is not None
+    for name, value in wanted.items():
+        if loaded.values[name] != value:
+            raise ModelError(
+                f"{loaded.file}: parameter {name} = {value!r} was written but reads back as {loaded.values[name]!r}; a"
+                " <compiler> option or a <frame> of this file changes its numbers",
+                file=loaded.file,
+                parameter=name,
+                value=loaded.values[name],
+            )
 
 
-def _quotient(product: float, factor: float) -> float:
-    """The number whose product with *factor* is *product*; of several, the one with the shortest decimal form.
-
-    Division alone is one rounding off for some fractions; a user who asked for 0.45 reads 0.45 back.
-    """
-    if factor == 1.0:
-        return product
-    near = product / factor
-    candidates = [v for v in (near, math.nextafter(near, -math.inf), math.nextafter(near, math.inf)) if v * factor == product]
-    return min(candidates, key=lambda v: len(repr(v)), default=near)
+@dataclass(frozen=True)
+class _Read:
+    kind: type[Mechanism] | None
+    values: Mapping[str, float] | None
+    elements: list[Element]
 
 
-def _compiled(model: mujoco.MjModel, target: Target, file: str) -> float:
-    vector = _vector(model, target, file)
-    return float(vector[target.index])
+@lru_cache(maxsize=8)
+def _read_once(text: str, file: str) -> _Read:
+    """What a sweep over one file needs of it again and again."""
+    loaded = _load(text, file)
+    return _Read(loaded.kind, loaded.values, scan(text, file))
 
 
-def _vector(model: mujoco.MjModel, target: Target, file: str) -> np.ndarray:
-    if target.element == "option":
-        return np.asarray(getattr(model.opt, target.attribute))
-    if (target.element, target.attribute) == ("inertial", "diaginertia"):
-        body = _index(model, mujoco.mjtObj.mjOBJ_BODY, "body", target.name, file)
-        rotation = np.empty(9)
-        mujoco.mju_quat2Mat(rotation, model.body_iquat[body])
-        matrix = rotation.reshape(3, 3)
-        return np.diag(matrix @ np.diag(model.body_inertia[body]) @ matrix.T)
-    kind, name = FIELDS[target.element, target.attribute]
-    tag = "body" if target.element == "inertial" else target.element
-    return np.atleast_1d(getattr(model, name)[_index(model, kind, tag, target.name, file)])
+def _load(text: str, file: str) -> LoadedModel:
+    elements = scan(text, file)
+    model = compile_text(text, file)
+    kind = _kind(model, file)
+    if kind is None:
+        return LoadedModel(file, text, model, None)
+    context = Context(model, kind, file, text)
+    refuse_broken(context, None)
+    values = read_parameters(model, kind, file, text, elements)
+    refuse_broken(context, values)
+    return LoadedModel(file, text, model, kind(kind.parameter_type(**values)), kind, values)
 
 
-def _index(model: mujoco.MjModel, kind: mujoco.mjtObj, tag: str, name: str, file: str) -> int:
-    index = int(mujoco.mj_name2id(model, kind, name))
-    if index < 0:
-        names = [mujoco.mj_id2name(model, kind, i) or "" for i in range(getattr(model, f"n{tag}", 0))]
-        hint = did_you_mean(name, [n for n in names if n]) if names else ""
-        raise ModelError(f'{file}: <{tag} name="{name}"> is missing{hint}', file=file, element=name)
-    return index
-
-
-def _check_numbers(
-    model: mujoco.MjModel, mechanism: type[Mechanism], values: Mapping[str, float], file: str
-) -> None:
-    """Every number that the parameters determine must have its value; the rest of each position must be zero."""
-    covered: dict[tuple[str, str, str], dict[int, Target]] = {}
-    for target in mechanism.targets:
-        if target.element != "geom":
-            covered.setdefault((target.element, target.name, target.attribute), {})[target.index] = target
-    for (element, name, attribute), targets in covered.items():
-        vector = _vector(model, next(iter(targets.values())), file)
-        where = f'{file}: {element} "{name}" {attribute}' if name else f"{file}: {element} {attribute}"
-        for index, found in enumerate(vector):
-            if index in targets:
-                expected = _number(targets[index], values)
-                rule = " * ".join([f"{targets[index].factor:g}", *targets[index].of])
-            elif attribute in ("pos", "gravity"):
-                expected, rule = 0.0, "on the axis"
-            else:
-                continue
-            limit = ALIGNMENT * max(1.0, abs(expected))
-            if not abs(found - expected) <= limit:
-                raise ModelError(
-                    f"{where}, number {index + 1} is {found:.9g}; the closed form needs {expected:.9g} ({rule}) within"
-                    f" {limit:g}",
-                    file=file,
-                    element=name,
-                    attribute=attribute,
-                    value=float(found),
-                    limit=limit,
-                )
-
-
-def element_line(text: str, file: str, tag: str, name: str) -> int | None:
-    """Line of an element in the text, for messages; None where it is missing."""
-    element = find(scan(text, file), tag, name)
-    return element.line if element else None
+def _kind(model: mujoco.MjModel, file: str) -> type[Mechanism] | None:
+    name = custom_text(model, "mechanism")
+    if name is None:
+        return None
+    if name not in MECHANISMS:
+        raise ModelError(f'{file}: unknown mechanism "{name}"{did_you_mean(name, MECHANISMS)}', file=file)
+    return mechanism_class(name)

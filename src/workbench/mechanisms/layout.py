@@ -21,9 +21,9 @@ Z: Axis = (0.0, 0.0, 1.0)
 class BodyInfo:
     """A moving body that the closed form knows, and the one joint by which it hangs on its parent.
 
-    Where every joint coordinate is zero, a body's axes are its parent's: only a passive hinge may be turned about its own
-    axis, and a ball joint in any way. A position that no `Target` gives is zero at coordinate zero; only a passive slide
-    may be shifted along its own axis.
+    Where every joint coordinate is zero, a body's axes are its parent's: only a passive hinge may be turned about its
+    own axis, and a ball joint in any way. A position that no `Target` gives is zero at coordinate zero; only a passive
+    slide may be shifted along its own axis.
     """
 
     name: str

@@ -1,0 +1,160 @@
+"""What a model file may not do: read other files, load code, or make the compiler run out of memory or time.
+
+A model is refused for it before MuJoCo sees it, in one line that names the file's line.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import stat
+from pathlib import Path
+
+from workbench.errors import ModelError
+
+MAX_BYTES = 10_000_000
+"""A model larger than this is refused before it is parsed."""
+
+MAX_ELEMENTS = 20_000
+MAX_DEPTH = 100
+"""Elements inside elements; MuJoCo's own parser gives up at 500."""
+
+REFUSED_TAGS = {
+    "include": "reads another file; put the whole model in one file",
+    "plugin": "loads code into MuJoCo",
+    "extension": "loads code into MuJoCo",
+    "attach": "takes its content from another model; put the whole model in one file",
+    "model": "reads another model; put the whole model in one file",
+    "replicate": "multiplies what it holds; write the copies out",
+    "composite": "makes deformable bodies; none is covered",
+    "flexcomp": "makes deformable bodies; none is covered",
+    "flex": "is a deformable body; none is covered",
+    "skin": "is a deformable body; none is covered",
+}
+"""tag -> why it is refused"""
+
+DIRECTORIES = ("assetdir", "meshdir", "texturedir")
+"""attributes that say where other files lie; those that name a file begin with ``file``"""
+
+LARGEST = {
+    "width": 4096,
+    "height": 4096,
+    "nrow": 4096,
+    "ncol": 4096,
+    "params": 256,
+    "nsample": 10_000,
+    "nuserdata": 1_000_000,
+    "nkey": 10_000,
+    "njmax": 1_000_000,
+    "nconmax": 1_000_000,
+    "nstack": 10_000_000,
+    "offwidth": 8192,
+    "offheight": 8192,
+    "shadowsize": 16384,
+    "offsamples": 64,
+}
+"""attribute -> largest number allowed in it; each of them makes MuJoCo take memory in proportion"""
+
+LARGEST_OF_TAG = {("numeric", "size"): 1_000_000}
+LARGEST_USER = 1_000
+"""for ``nuser_body`` and its like, numbers kept for every body, joint ..."""
+
+LARGEST_MEMORY = 2**30
+"""bytes that ``<size memory=...>`` may ask for"""
+
+MEMORY_UNITS = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40, "P": 2**50, "E": 2**60}
+NOT_FINITE = re.compile(r"[+-]?(?:nan(?:\([^)]*\))?|inf(?:inity)?)", re.IGNORECASE)
+NAMING = ("name", "class", "childclass", "data", "model")
+"""attributes of free text, where the word "inf" is no number"""
+
+
+def read_text(path: Path) -> str:
+    """Read an MJCF file; the text keeps its line endings and its byte order mark.
+
+    Raises
+    ------
+    ModelError
+        Not a regular file, not readable, not UTF-8, or too large. A pipe is refused, not waited for.
+    """
+    try:
+        # O_NONBLOCK: opening a pipe that nobody writes to would wait for ever
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        with open(handle, "rb") as stream:
+            status = os.fstat(stream.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                kind = "a directory" if stat.S_ISDIR(status.st_mode) else "no regular file"
+                raise ModelError(f"{path}: is {kind}; a model is an XML file", file=str(path))
+            if status.st_size > MAX_BYTES:
+                raise ModelError(f"{path}: {status.st_size} bytes; allowed: at most {MAX_BYTES}", file=str(path))
+            raw = stream.read(MAX_BYTES + 1)
+        return raw.decode()
+    except UnicodeDecodeError as error:
+        raise ModelError(f"{path}: not UTF-8 text (byte {error.start})", file=str(path)) from error
+    except OSError as error:
+        if error.errno == errno.EISDIR or path.is_dir():
+            raise ModelError(f"{path}: is a directory; a model is an XML file", file=str(path)) from error
+        raise ModelError(f"{path}: {error.strerror or error}", file=str(path)) from error
+    except ValueError as error:  # a null byte in the name
+        raise ModelError(f"{str(path)!r}: {error}", file=str(path)) from error
+
+
+def refuse_element(tag: str, attributes: dict[str, str], depth: int, count: int, where: str) -> None:
+    """Refuse one start tag.
+
+    Parameters
+    ----------
+    tag, attributes
+        As the parser decoded them.
+    depth, count
+        Elements that hold this one, and elements so far.
+    where
+        ``file:line``, for the message.
+
+    Raises
+    ------
+    ModelError
+        It reads another file, loads code, or asks for more memory than a model of a robot needs.
+    """
+    if depth == 0 and tag != "mujoco":
+        raise ModelError(f"{where}: the file's root is <{_short(tag)}>; an MJCF model begins with <mujoco>")
+    if depth > MAX_DEPTH:
+        raise ModelError(f"{where}: elements nest deeper than {MAX_DEPTH}")
+    if count > MAX_ELEMENTS:
+        raise ModelError(f"{where}: more than {MAX_ELEMENTS} elements")
+    if tag in REFUSED_TAGS:
+        raise ModelError(f"{where}: <{tag}> {REFUSED_TAGS[tag]}", element=tag)
+    for key, value in attributes.items():
+        if key.startswith("file") or key in DIRECTORIES:
+            raise ModelError(f'{where}: <{tag} {key}="{_short(value)}"> reads another file', element=tag, attribute=key)
+        limit = LARGEST.get(key) or LARGEST_OF_TAG.get((tag, key)) or (LARGEST_USER if key[:6] == "nuser_" else None)
+        if limit is not None and any(_number(token) > limit for token in value.split()):
+            raise ModelError(
+                f'{where}: <{tag} {key}="{_short(value)}">; allowed: at most {limit}', element=tag, attribute=key
+            )
+        if (tag, key) == ("size", "memory") and _memory(value) > LARGEST_MEMORY:
+            raise ModelError(f'{where}: <size memory="{_short(value)}">; allowed: at most 1G', element=tag)
+
+
+def not_finite(attributes: dict[str, str]) -> tuple[str, str] | None:
+    """Return the first attribute and value that holds NaN or infinity as a number, or None."""
+    for key, value in attributes.items():
+        if key not in NAMING and any(NOT_FINITE.fullmatch(token) for token in value.split()):
+            return key, value
+    return None
+
+
+def _number(token: str) -> float:
+    try:
+        return float(token)
+    except ValueError:  # MuJoCo will say what is wrong with it
+        return 0.0
+
+
+def _memory(value: str) -> float:
+    unit = value[-1:].upper()
+    return _number(value[:-1]) * MEMORY_UNITS[unit] if unit in MEMORY_UNITS else _number(value)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else text[:57] + "..."
