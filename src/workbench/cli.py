@@ -1,7 +1,11 @@
-"""The command line: parse, call, print. Exit code 0: every bound holds; 1: a bound fails; 2: bad input."""
+"""The command line: parse, call, print.
+
+Exit code 0: every bound holds; 1: a bound fails; 2: bad input; 3: a fault of the workbench itself; 130: interrupted.
+"""
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, NoReturn
@@ -22,6 +26,15 @@ app = typer.Typer(
 
 BOUND_FAILED = 1
 BAD_INPUT = 2
+INTERNAL = 3
+INTERRUPTED = 130
+BROKEN_PIPE = 141
+
+TRACEBACK = "WORKBENCH_TRACEBACK"
+"""environment variable: when set, a fault of the workbench itself shows its traceback"""
+
+USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
+"""what the parser raises for a wrong command line, by whichever name its version exports it"""
 
 
 def _version(wanted: bool) -> None:
@@ -32,26 +45,35 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def _root(
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
 ) -> None:
     """Validate closed-form dynamics of parallel robots against MuJoCo."""
 
 
 @app.command()
 def run(
-    campaign: Annotated[Path, typer.Argument(help="Campaign file (TOML), or the name of one that comes along.")],
-    out: Annotated[Path | None, typer.Option(help="Run directory.", show_default="reports/<campaign name>")] = None,
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN", help="Campaign file (TOML), or the name of one that comes along.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Run directory; an earlier run in it is replaced. Default: reports/NAME."),
+    ] = None,
     only: Annotated[list[str] | None, typer.Option(metavar="CASE", help="Run this case only; may be repeated.")] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI units; may be repeated."),
     ] = None,
-    model: Annotated[Path | None, typer.Option(help="MJCF file in place of the campaign's own.")] = None,
+    model: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="MJCF file in place of the campaign's own.")
+    ] = None,
 ) -> None:
     """Run a campaign: closed forms against MuJoCo, with a table of errors, a verdict and a report."""
-    from workbench.campaign.run import run_campaign  # noqa: PLC0415 - start-up stays light
-    from workbench.console import CaseProgress, print_outcome  # noqa: PLC0415
-    from workbench.report import build_report  # noqa: PLC0415
+    from workbench.campaign.run import run_campaign
+    from workbench.console import CaseProgress, print_outcome
+    from workbench.report import build_report
 
     with CaseProgress() as progress:
         outcome = run_campaign(
@@ -77,31 +99,53 @@ def _settings(assignments: list[str]) -> dict[str, float]:
     ParameterError
         No ``=``, or a value that is not a number.
     """
-    settings = {}
+    settings: dict[str, float] = {}
     for assignment in assignments:
-        name, equals, value = assignment.partition("=")
+        name, equals, text = (part.strip() for part in assignment.partition("="))
         try:
-            settings[name.strip()] = float(value)
+            value = float(text)
         except ValueError:
             equals = ""
-        if not equals:
+        if not name or not equals:
             raise ParameterError(f'--set "{assignment}": expected NAME=VALUE with a number in SI units')
+        if name in settings:
+            raise ParameterError(f"--set {name} is given twice")
+        settings[name] = value
     return settings
 
 
 def main() -> NoReturn:
-    """Run the command line; whatever the workbench raises becomes one line and exit code 2."""
+    """Run the command line; whatever goes wrong becomes one line and an exit code."""
+    sys.exit(_run(sys.argv[1:] or ["--help"]))
+
+
+def _run(arguments: list[str]) -> int:
     try:
-        app()
-    except WorkbenchError as error:
-        typer.echo(f"workbench: {error}", err=True)
-        sys.exit(BAD_INPUT)
-    except KeyboardInterrupt:
-        typer.echo("workbench: interrupted; nothing was written", err=True)
-        sys.exit(130)
+        code = app(args=arguments, prog_name="workbench", standalone_mode=False)
+    except (WorkbenchError, USAGE_ERROR) as error:
+        return _complain(error, BAD_INPUT)
+    except MemoryError:
+        return _complain("out of memory; fewer samples need less", BAD_INPUT)
     except BrokenPipeError:
-        sys.exit(141)
-    sys.exit(0)
+        # nobody reads any more; a flush at exit would complain
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _complain(f"{where}{error.strerror or error}", BAD_INPUT)
+    except Exception as error:
+        if os.environ.get(TRACEBACK):
+            raise
+        return _complain(f"internal error, {type(error).__name__}: {error}; {TRACEBACK}=1 shows where", INTERNAL)
+    if code == INTERRUPTED:
+        return _complain("interrupted", INTERRUPTED)
+    return int(code or 0)
+
+
+def _complain(what: object, code: int) -> int:
+    message = what.format_message() if hasattr(what, "format_message") else str(what)
+    typer.echo(f"workbench: {' '.join(message.split())}", err=True)
+    return code
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ def _version(distribution: str) -> str:
     try:
         return version(distribution)
     except PackageNotFoundError:
-        from workbench._version import __version__  # noqa: PLC0415
+        from workbench._version import __version__
 
         return __version__ if distribution == "parallel-robot-workbench" else "unknown"
 

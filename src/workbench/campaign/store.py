@@ -71,7 +71,7 @@ def _check_existing(directory: Path, place: Path) -> None:
     strangers = [name for name in found if name not in (MANIFEST, SUMMARY, SERIES, *REPORTS, *IGNORED)]
     if strangers:
         raise OutputError(
-            f"{directory}: {strangers[0]} is no part of a run and would be lost; move it away or name another directory",
+            f"{directory}: {strangers[0]} is no part of a run and would be lost; move it or name another directory",
             path=str(directory),
         )
     if not os.access(place, os.W_OK | os.X_OK):
