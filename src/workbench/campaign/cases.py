@@ -9,8 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.campaign.spec import Campaign, CaseSpec, CsvMotion, CycleMotion, MultiSineMotion, SineMotion
-from workbench.campaign.spec import MAX_SAMPLES, shorten
+from workbench.campaign.spec import (
+    MAX_SAMPLES,
+    Campaign,
+    CaseSpec,
+    CsvMotion,
+    CycleMotion,
+    MultiSineMotion,
+    SineMotion,
+    shorten,
+)
 from workbench.data_files import bundled, bundled_names
 from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
 from workbench.mechanisms.base import Mechanism
@@ -40,7 +48,11 @@ class Case:
 
 
 def resolve_cases(
-    campaign: Campaign, file: Path, model: Path | None = None, only: tuple[str, ...] = (), settings: Mapping[str, float] | None = None
+    campaign: Campaign,
+    file: Path,
+    model: Path | None = None,
+    only: tuple[str, ...] = (),
+    settings: Mapping[str, float] | None = None,
 ) -> list[Case]:
     """Resolve every case: parameters (campaign, case, command line), model, motion, candidates.
 
@@ -130,8 +142,12 @@ def _check_candidates(campaign: Campaign, mechanism: Mechanism) -> None:
         if candidate.reference not in mechanism.mass_models:
             hint = did_you_mean(candidate.reference, mechanism.mass_models)
             raise SpecError(f'candidate "{candidate.name}": no reference "{candidate.reference}"{hint}')
+        for failing in (name for joints in candidate.expect_fail.values() for name in joints):
+            if failing not in mechanism.joints:
+                hint = did_you_mean(failing, mechanism.joints)
+                raise SpecError(f'candidate "{candidate.name}": expect_fail: no joint "{shorten(failing)}"{hint}')
     for figure in campaign.figure:
-        if figure.kind == "torque" and figure.joint not in mechanism.joints:
+        if (figure.kind == "torque" or figure.joint) and figure.joint not in mechanism.joints:
             hint = did_you_mean(str(figure.joint), mechanism.joints)
             raise SpecError(f'figure "{figure.id}": no joint "{figure.joint}"{hint}')
     for claim in campaign.claim:

@@ -11,6 +11,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case, at_time
 from workbench.campaign.spec import Campaign, CandidateSpec
+from workbench.campaign.verdict import FAILURES, kind_of, verdict_of
 from workbench.errors import ArrayError, MotionError
 from workbench.metrics import relative_error
 from workbench.reference import MujocoReference, ReferenceResult
@@ -59,7 +60,7 @@ def compute_case(campaign: Campaign, case: Case) -> CaseResult:
         The reference cannot follow the motion; the message names the time and the joint.
     """
     motion, mechanism = case.motion, case.mechanism
-    reference = MujocoReference(case.model, **case.overrides)
+    reference = MujocoReference(case.model, threads=1, **case.overrides)
     results: dict[str, ReferenceResult] = {}
     series = _motion_columns(case)
     try:
@@ -93,10 +94,6 @@ def _rows(case: Case, candidate: CandidateSpec, tau: FloatArray, reference: Floa
     rows = []
     for i, joint in enumerate(case.mechanism.joints):
         error = relative_error(tau[:, i], reference[:, i])
-        if candidate.bound is None:
-            verdict = "measured"
-        else:
-            verdict = "pass" if error.peak_error <= candidate.bound else "fail"
         rows.append(
             Row(
                 case=case.name,
@@ -108,8 +105,8 @@ def _rows(case: Case, candidate: CandidateSpec, tau: FloatArray, reference: Floa
                 pointwise_error=error.pointwise_error,
                 worst_time_s=float(case.motion.t[error.worst_index]),
                 bound=candidate.bound,
-                verdict=verdict,
-                kind="modelling" if candidate.bound is None else "verification",
+                verdict=verdict_of(candidate, case.name, joint, error.peak_error),
+                kind=kind_of(candidate),
                 unit=case.mechanism.force_units[i],
                 peak_reference=error.peak_reference,
                 pointwise_skipped=error.pointwise_skipped,
@@ -145,7 +142,7 @@ def _facts(case: Case, reference: MujocoReference, result: ReferenceResult, rows
     }
     apart = [f"{name} by {error:.2g}" for name, error in kinematics.items() if not error <= KINEMATICS_BOUND]
     message = f"platform {', '.join(apart)} of its peak (allowed: {KINEMATICS_BOUND:g})" if apart else None
-    failed = bool(apart) or any(row.verdict == "fail" for row in rows)
+    failed = bool(apart) or any(row.verdict in FAILURES for row in rows)
     return {
         "status": "failed" if failed else "passed",
         "title": case.spec.title,

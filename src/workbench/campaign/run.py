@@ -144,7 +144,7 @@ def _manifest(
             for name, c in candidates.items()
         },
         "claims": judge_claims(campaign, rows, facts),
-        "figures": [figure.model_dump() for figure in campaign.figure if figure.case in facts],
+        "figures": [kept.model_dump() for figure in campaign.figure if (kept := figure.among(set(facts)))],
         "cases": dict(facts),
         "versions": provenance.versions(),
         "machine": provenance.machine(),

@@ -10,34 +10,21 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
+from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
+from workbench.campaign.schema import NAME_RULE, Finite, Name, Strict, Triple, Vector
 from workbench.data_files import bundled
 from workbench.errors import SpecError, WorkbenchError, did_you_mean
 
 FORMAT = 1
-NAME = r"^[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}$"
-"""Names of campaigns and cases become file names: letters, digits and ``_ . + -``."""
-
-NAME_RULE = "allowed: letters, digits and _ . + -, first a letter or digit, at most 100 characters"
-
 MAX_SAMPLES = 100_000
 """Samples of one case: the reference holds some 20 kB of matrices for each while it computes."""
 
 SHOWN = 60
 """Longest piece of a campaign's text that a message repeats."""
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Vector = Annotated[list[Finite], Field(min_length=1)]
-Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
-Name = Annotated[str, Field(pattern=NAME)]
 Samples = Annotated[int, Field(le=MAX_SAMPLES)]
-
-
-class Strict(BaseModel):
-    """No unknown keys, no silent conversion of text to numbers."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Window(Strict):
@@ -113,6 +100,14 @@ class CandidateSpec(Strict):
     name: str
     reference: str
     bound: Annotated[Finite, Field(gt=0)] | None = None
+    expect_fail: dict[str, Annotated[list[str], Field(min_length=1)]] = Field(default_factory=dict)
+    """case -> joints whose error has to exceed the bound there; joints that are not named have to keep it"""
+
+    @model_validator(mode="after")
+    def _failure_of_what(self) -> CandidateSpec:
+        if self.expect_fail and self.bound is None:
+            raise ValueError("expect_fail needs a bound that can fail")
+        return self
 
 
 class CaseSpec(Strict):
@@ -122,8 +117,8 @@ class CaseSpec(Strict):
     title: str = ""
     description: str = ""
     motion: Motion
-    parameters: dict[str, Finite] = {}
-    external_force: Triple = [0.0, 0.0, 0.0]
+    parameters: dict[str, Finite] = Field(default_factory=dict)
+    external_force: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
 
 
 class Measure(Strict):
@@ -163,37 +158,19 @@ class ClaimSpec(Strict):
     note: str = ""
 
 
-class FigureSpec(Strict):
-    """A figure of the paper, redrawn."""
-
-    id: Name
-    title: str
-    case: str
-    kind: Literal["platform", "platform_velocity", "platform_acceleration", "torque"]
-    joint: str | None = None
-    curves: list[str] = []
-    source: str = ""
-
-    @model_validator(mode="after")
-    def _torque(self) -> FigureSpec:
-        if self.kind == "torque" and (self.joint is None or not self.curves):
-            raise ValueError("a figure of kind torque needs joint and curves")
-        return self
-
-
 class Campaign(Strict):
     """A whole campaign file."""
 
-    format: Literal[1] = FORMAT
+    format: Literal[1] = 1
     name: Name
     title: str
     description: str = ""
     model: str
-    parameters: dict[str, Finite] = {}
+    parameters: dict[str, Finite] = Field(default_factory=dict)
     candidate: Annotated[list[CandidateSpec], Field(min_length=1)]
     case: Annotated[list[CaseSpec], Field(min_length=1)]
-    claim: list[ClaimSpec] = []
-    figure: list[FigureSpec] = []
+    claim: list[ClaimSpec] = Field(default_factory=list)
+    figure: list[FigureSpec] = Field(default_factory=list)
 
 
 def load_campaign(path: str | Path) -> tuple[Campaign, Path]:
@@ -259,11 +236,11 @@ def _first(error: ValidationError, document: dict[str, Any]) -> str:
     where = _place(place, document)
     if issue["type"] == "extra_forbidden":
         key = str(place[-1])
-        return f'{where}: unknown key{did_you_mean(key, _valid_keys(issue["loc"]))}'
+        return f"{where}: unknown key{did_you_mean(key, _valid_keys(issue['loc']))}"
     if issue["type"] == "missing":
         return f"{where}: missing; this key is required"
     if issue["type"].startswith("union_tag"):
-        return f'{where}.kind{_wrong_kind(issue["input"])}'
+        return f"{where}.kind{_wrong_kind(issue['input'])}"
     if issue["type"] == "string_pattern_mismatch":
         return f"{where} = {shorten(repr(issue['input']))}; {NAME_RULE}"
     message = issue["msg"].removeprefix("Value error, ").removeprefix("Input ")
@@ -308,11 +285,13 @@ def _place(place: list[int | str], document: Any) -> str:
     text, node = "", document
     for part in place:
         try:
-            node = node[part]  # type: ignore[index]
+            node = node[part]
         except (KeyError, IndexError, TypeError):
             node = None
         if isinstance(part, int):
-            name = next((node[k] for k in ("name", "id") if isinstance(node, dict) and isinstance(node.get(k), str)), "")
+            name = next(
+                (node[k] for k in ("name", "id") if isinstance(node, dict) and isinstance(node.get(k), str)), ""
+            )
             text += f' "{shorten(name)}"' if name else f"[{part + 1}]"
         else:
             text += f".{part}" if text else str(part)
@@ -337,9 +316,11 @@ def _check_names(campaign: Campaign, file: str) -> None:
         for item in items:
             if ids.count(item.id) > 1:
                 raise SpecError(f'{file}: two {kind}s have the id "{item.id}"', file=file)
-            case = item.measure.case if isinstance(item, ClaimSpec) else item.case
-            if case not in cases:
-                raise SpecError(f'{file}: {kind} "{item.id}" names case "{case}"{did_you_mean(case, cases)}', file=file)
+            for case in [item.measure.case] if isinstance(item, ClaimSpec) else item.needs:
+                _check_case(f'{kind} "{item.id}" names', case, cases, file)
+    for candidate in campaign.candidate:
+        for case in candidate.expect_fail:
+            _check_case(f'candidate "{candidate.name}": expect_fail names', case, cases, file)
     for claim in campaign.claim:
         _check_measure(claim, rows, file)
     curves = [f"cand:{name}" for name, _ in rows] + [f"ref:{reference}" for _, reference in rows]
@@ -348,6 +329,17 @@ def _check_names(campaign: Campaign, file: str) -> None:
             if curve not in curves:
                 hint = did_you_mean(curve, set(curves))
                 raise SpecError(f'{file}: figure "{figure.id}": no curve "{shorten(curve)}"{hint}', file=file)
+            if figure.reference and (curve.removeprefix(CANDIDATE_CURVE), figure.reference) not in rows:
+                raise SpecError(
+                    f'{file}: figure "{figure.id}": no candidate "{curve.removeprefix(CANDIDATE_CURVE)}" against'
+                    f' "{shorten(figure.reference)}"',
+                    file=file,
+                )
+
+
+def _check_case(who: str, case: str, cases: list[str], file: str) -> None:
+    if case not in cases:
+        raise SpecError(f'{file}: {who} case "{shorten(case)}"{did_you_mean(case, cases)}', file=file)
 
 
 def _check_measure(claim: ClaimSpec, rows: list[tuple[str, str]], file: str) -> None:
