@@ -16,7 +16,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
 from workbench.reference.engine import Engine
-from workbench.reference.kernels import closure_steps, integrate
+from workbench.reference.kernels import closure_steps, integrate, rows_sample
 from workbench.reference.structure import Structure
 
 CLOSED = 1e-13
@@ -32,6 +32,10 @@ SMALLEST_STEP = 1e-4
 """Fraction of the way from the start to a sample; a smaller step means that the way is blocked."""
 
 NEWTON_STEPS = 8
+FREE_STEPS = 60
+LONGEST_FREE_STEP = 0.2
+"""rad or m: damped, so that an open home pose closes on the branch that it is nearest to."""
+
 SEED_SPACING = 24
 """One sample in so many is reached from the home pose; the others start from the nearest of those."""
 
@@ -61,12 +65,15 @@ class LoopCloser:
         q_home = home[:, structure.actuated_qpos]
         closed, done, residual = self._newton(home.copy(), q_home, np.zeros(1, dtype=np.int64))
         if not done[0]:
-            raise ModelError(
-                f"{structure.file}: the loops cannot be closed from the home pose; {self._worst_block(closed)} stays"
-                f" open by {residual[0]:.3g} m (allowed: {CLOSED:g})",
-                file=structure.file,
-                value=float(residual[0]),
-            )
+            # edited lengths can put the file's home pose out of reach: move the actuated joints too, as little as needed
+            closed, residual = self._close_freely(home.copy())
+            if not residual[0] <= CLOSED:
+                raise ModelError(
+                    f"{structure.file}: the loops cannot be closed from the home pose; {self._worst_block(closed)} stays"
+                    f" open by {residual[0]:.3g} m (allowed: {CLOSED:g})",
+                    file=structure.file,
+                    value=float(residual[0]),
+                )
         self.home = closed[0]
 
     def close(self, q: FloatArray) -> Assembly:
@@ -121,6 +128,20 @@ class LoopCloser:
             if len(stuck):
                 self._refuse(int(names[stuck[0]]), target[stuck[0]], qpos[stuck[0]])
             active = active[(done[active] < 1.0)]
+        return qpos, residual
+
+    def _close_freely(self, qpos: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Close one configuration ``(1, nq)`` by least-norm Newton steps on all joints, the actuated ones included."""
+        structure = self.structure
+        residual = np.full(1, np.inf)
+        for _ in range(FREE_STEPS):
+            jacobian, open_by = constraint_jacobian(self.engine, structure, self.joints, qpos)
+            residual = np.abs(open_by).max(keepdims=True)
+            if residual[0] <= 0.01 * CLOSED or not np.isfinite(residual[0]):
+                break
+            step = -np.linalg.lstsq(jacobian, open_by, rcond=1e-9)[0]
+            step *= min(1.0, LONGEST_FREE_STEP / max(float(np.linalg.norm(step)), 1e-300))
+            integrate(qpos[0].copy(), step, *self.joints, qpos[0])
         return qpos, residual
 
     def _step(self, qpos: FloatArray, change: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -194,6 +215,20 @@ class LoopCloser:
             for b in structure.blocks
         ]
         return f'equality "{structure.block_names[int(np.argmax(gaps))]}"' if gaps else "the model"
+
+
+def constraint_jacobian(
+    engine: Engine, structure: Structure, joints: tuple[np.ndarray, ...], qpos: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Constraint Jacobian ``(m, nv)``, spin rows last, and residual ``(m,)`` of one configuration ``(1, nq)``."""
+    poses = engine.poses(qpos)
+    jacobian, residual = np.zeros((structure.rows, poses.cdof.shape[1])), np.zeros(structure.rows)
+    rows_sample(
+        poses.cdof[0], poses.com[0], structure.moves, structure.root, structure.blocks, structure.block_rows,
+        structure.polynomials, poses.site_xpos[0], poses.site_xquat[0], poses.anchors[0], qpos[0][joints[1]], joints[2],
+        jacobian, residual,
+    )  # fmt: skip
+    return jacobian, residual
 
 
 def _nearest(points: FloatArray, seeds: FloatArray) -> np.ndarray:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf import custom_text, load_model
-from workbench.reference.closure import Assembly, LoopCloser
+from workbench.reference.closure import Assembly, LoopCloser, constraint_jacobian
 from workbench.reference.engine import Engine, mass_layout, without_bar_inertia
 from workbench.reference.kernels import projection, velocities
 from workbench.reference.reactions import joint_reactions
@@ -252,18 +252,8 @@ class MujocoReference:
         self._base_position = data.xpos[self._structure.base].copy()
 
     def _home_jacobian(self) -> FloatArray:
-        from workbench.reference.kernels import rows_sample  # noqa: PLC0415
-
-        structure, joints = self._structure, self._closer.joints
         home = self._closer.home[None, :]
-        poses = self._engines["distributed"].poses(home)
-        jacobian, residual = np.zeros((structure.rows, poses.cdof.shape[1])), np.zeros(structure.rows)
-        rows_sample(
-            poses.cdof[0], poses.com[0], structure.moves, structure.root, structure.blocks, structure.block_rows,
-            structure.polynomials, poses.site_xpos[0], poses.site_xquat[0], poses.anchors[0], home[0][joints[1]],
-            joints[2], jacobian, residual,
-        )  # fmt: skip
-        return jacobian
+        return constraint_jacobian(self._engines["distributed"], self._structure, self._closer.joints, home)[0]
 
     def _check_freedoms(self) -> None:
         """Every passive freedom must follow from the actuated ones."""
