@@ -33,6 +33,7 @@ __all__ = [
     "find_model",
     "load_mechanism",
     "load_model",
+    "load_text",
     "open_model",
     "read_parameters",
     "read_text",
@@ -153,7 +154,7 @@ def load_model(path: str | Path, overrides: Mapping[str, float] | None = None) -
     file = str(path)
     text = read_text(find_model(path))
     if not overrides:
-        return _load(text, file)
+        return load_text(text, file)
     base = _read_once(text, file)
     if base.kind is None or base.values is None:
         raise ModelError(
@@ -161,7 +162,7 @@ def load_model(path: str | Path, overrides: Mapping[str, float] | None = None) -
             file=file,
         )
     wanted = changed_parameters(base.kind, base.values, overrides)
-    loaded = _load(rewrite(text, file, base.kind, base.values, wanted, base.elements), file)
+    loaded = load_text(rewrite(text, file, base.kind, base.values, wanted, base.elements), file)
     confirm(loaded, wanted)
     return loaded
 
@@ -265,11 +266,18 @@ class _Read:
 @lru_cache(maxsize=8)
 def _read_once(text: str, file: str) -> _Read:
     """What a sweep over one file needs of it again and again."""
-    loaded = _load(text, file)
+    loaded = load_text(text, file)
     return _Read(loaded.kind, loaded.values, scan(text, file))
 
 
-def _load(text: str, file: str) -> LoadedModel:
+def load_text(text: str, file: str) -> LoadedModel:
+    """Load an MJCF text as `load_model` does a file; *file* is the name under which errors speak of it.
+
+    Raises
+    ------
+    ModelError, ParameterError
+        See `load_model`.
+    """
     elements = scan(text, file)
     model = compile_text(text, file)
     kind = _kind(model, file)
