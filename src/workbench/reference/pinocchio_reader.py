@@ -1,13 +1,15 @@
 """Read an MJCF through Pinocchio's own reader, and make sure that it read the robot that the file describes.
 
-Pinocchio 4.1 reads only part of MJCF and says nothing about the rest: of several top-level bodies it keeps the first; it
-drops ``<frame>``, sites of fixed bodies, damping of ball joints and ``<option gravity>``; it merges the joints of one body
-into a nameless one; it misplaces sites of bodies welded to one whose joint has ``pos``; it takes axes of ``axisangle`` for
-unit vectors; and geoms that nothing collides with have no mass for it. It does handle ``ref``: coordinates are MuJoCo's.
+Pinocchio 4.1 reads only part of MJCF and says nothing about the rest: of several top-level bodies it keeps the first,
+and of that one not the pose; it drops ``<frame>``, sites of the root body, damping of ball joints and
+``<option gravity>``; it merges the joints of one body into a nameless one; it misplaces sites of bodies welded to one
+whose joint has ``pos``; it ignores ``pos`` in defaults of sites; it takes axes of ``axisangle`` for unit vectors; and
+geoms that nothing collides with have no mass for it. It does handle ``ref``: coordinates are MuJoCo's.
 
-So the file is read twice: as it is written, and in a normal form that holds nothing but poses, joints and inertias as the
-MJCF compiler resolves them. Where both readings agree, the file as written is used; where they do not, the normal form.
-Gravity, damping and dry friction are set afterwards. No kinematics and no dynamics are taken from MuJoCo.
+So the file is read twice: as it is written, with all top-level bodies wrapped in one that is fixed, and in a normal
+form that holds nothing but poses, joints and inertias as the MJCF compiler resolves them. Where both readings agree,
+the file as written is used; where they do not, the normal form. Gravity, damping and dry friction are set afterwards.
+No kinematics and no dynamics are taken from MuJoCo.
 """
 
 from __future__ import annotations
@@ -23,13 +25,17 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MissingExtraError, ModelError
+from workbench.mjcf_text import scan
 
 INSTALL = 'pip install "parallel-robot-workbench[pinocchio]"'
 OLDEST = (4, 1)
 """Before this release the reader leaves `ref` out of the kinematics."""
 
 AGREEMENT = 1e-12
-"""Largest difference (m, kg, kg m^2, direction cosines, relative to the larger of 1 and the value) between two readings."""
+"""Largest difference between two readings: metres, direction cosines; inertias relative to the largest entry."""
+
+WRAPPER = "workbench_world"
+NOTHING = '<inertial pos="0 0 0" mass="0" diaginertia="0 0 0"/>'
 
 
 @dataclass(frozen=True)
@@ -67,7 +73,8 @@ def import_pinocchio() -> ModuleType:
             extra="pinocchio",
             value=version,
         )
-    return pinocchio
+    module: ModuleType = pinocchio
+    return module
 
 
 def _release(version: str) -> tuple[int, ...]:
@@ -96,7 +103,7 @@ def read(pin: ModuleType, text: str, compiled: mujoco.MjModel, sites: set[int], 
     except (RuntimeError, ValueError) as error:
         raise ModelError(f"{file}: Pinocchio does not read it: {_last_line(error)}", file=file) from error
     try:
-        reading, difference = _read_as_written(pin, text, compiled, sites)
+        reading, difference = _read_as_written(pin, text, compiled, sites, file)
         difference = difference or _difference(pin, reading, normal, compiled)
     except (RuntimeError, ValueError) as error:
         reading, difference = normal, _last_line(error)
@@ -136,10 +143,10 @@ def _build(pin: ModuleType, text: str) -> Any:
 
 
 def _read_as_written(
-    pin: ModuleType, text: str, compiled: mujoco.MjModel, sites: set[int]
+    pin: ModuleType, text: str, compiled: mujoco.MjModel, sites: set[int], file: str
 ) -> tuple[Reading, str]:
     """Read the file itself; everything is found by its name. The second value says what is missing."""
-    model = _build(pin, text)
+    model = _build(pin, _under_one_body(text, file))
     obj = mujoco.mjtObj
     joints, frames, bodies = [], {}, [0]
     for joint in range(compiled.njnt):
@@ -158,6 +165,15 @@ def _read_as_written(
             return Reading(model, (), {}, (), ""), f'site "{name or f"#{site}"}" is missing'
         frames[site] = int(model.getFrameId(name, pin.FrameType.OP_FRAME))
     return Reading(model, tuple(joints), frames, tuple(bodies), ""), ""
+
+
+def _under_one_body(text: str, file: str) -> str:
+    """Wrap what stands in the world in one fixed body, whose pose, none, the reader may drop."""
+    worlds = [element for element in scan(text, file) if element.tag == "worldbody"]
+    if len(worlds) != 1:
+        return text
+    start, end = worlds[0].end, text.rfind("</worldbody")
+    return f'{text[:start]}<body name="{WRAPPER}">{NOTHING}{text[start:end]}</body>{text[end:]}'
 
 
 def _read_normal_form(pin: ModuleType, compiled: mujoco.MjModel, sites: set[int]) -> Reading:
@@ -182,7 +198,6 @@ def normal_form(compiled: mujoco.MjModel) -> str:
     children: dict[int, list[int]] = {}
     for body in range(1, compiled.nbody):
         children.setdefault(int(compiled.body_parentid[body]), []).append(body)
-    nothing = '<inertial pos="0 0 0" mass="0" diaginertia="0 0 0"/>'
 
     def write(body: int) -> str:
         pose = f'pos="{_numbers(compiled.body_pos[body])}" quat="{_numbers(compiled.body_quat[body])}"'
@@ -193,7 +208,7 @@ def normal_form(compiled: mujoco.MjModel) -> str:
         first, count = int(compiled.body_jntadr[body]), int(compiled.body_jntnum[body])
         out = ""
         for joint in range(first, first + count - 1):  # all but the last joint move bodies that are only frames
-            out += f'<body name="carrier{joint}" {pose}>{nothing}{_joint(compiled, joint)}'
+            out += f'<body name="carrier{joint}" {pose}>{NOTHING}{_joint(compiled, joint)}'
             pose = ""
         last = _joint(compiled, first + count - 1) if count else ""
         out += f'<body name="body{body}" {pose}>{inertia}{last}'
@@ -203,7 +218,7 @@ def normal_form(compiled: mujoco.MjModel) -> str:
     tree = "".join(write(body) for body in children.get(0, []))
     return (
         '<mujoco model="normal_form"><compiler angle="radian" autolimits="true"/><worldbody>'
-        f'<body name="body0">{nothing}{tree}</body></worldbody></mujoco>'
+        f'<body name="body0">{NOTHING}{tree}</body></worldbody></mujoco>'
     )
 
 
@@ -240,12 +255,13 @@ def _difference(pin: ModuleType, one: Reading, two: Reading, compiled: mujoco.Mj
             ("armature", a.armature[a.idx_vs[i]], b.armature[b.idx_vs[j]]),
         )
         for what, first, second in pairs:
-            if not _close(first, second):
+            scale = np.abs(second).max() if what == "inertia" else 1.0
+            if not _close(first, second, scale):
                 return f'joint "{name}": {what} differs'
     for kind, places in (("site", [(one.sites[s], two.sites[s]) for s in two.sites]),
                          ("body", list(zip(one.bodies, two.bodies, strict=True)))):  # fmt: skip
         for i, j in places:
-            if not _close(a.frames[i].placement.homogeneous, b.frames[j].placement.homogeneous):
+            if not _close(a.frames[i].placement.homogeneous, b.frames[j].placement.homogeneous, 1.0):
                 return f'{kind} "{a.frames[i].name}": pose differs'
     return ""
 
@@ -261,9 +277,8 @@ def _motion(model: Any, joint: int) -> FloatArray:
     return np.asarray(data.S, dtype=np.float64).reshape(6, -1)[:, 0]
 
 
-def _close(one: Any, two: Any) -> bool:
-    one, two = np.asarray(one), np.asarray(two)
-    return bool(np.all(np.abs(one - two) <= AGREEMENT * np.maximum(1.0, np.abs(two))))
+def _close(one: Any, two: Any, scale: float) -> bool:
+    return bool(np.all(np.abs(np.asarray(one) - np.asarray(two)) <= AGREEMENT * scale))
 
 
 def _rotation(quaternion: Any) -> FloatArray:

@@ -1,0 +1,277 @@
+"""Loop closures in Pinocchio's kinematics: residuals, Jacobian, accelerations, and Newton on the passive joints.
+
+Written for one sample at a time and apart from the MuJoCo reference, with which it shares only the list of closures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import ModuleType
+
+import mujoco
+import numpy as np
+
+from workbench.arrays import FloatArray
+from workbench.errors import ModelError, MotionError
+from workbench.reference.pinocchio_reader import Reading
+from workbench.reference.structure import CONNECT, JOINT, SPIN, WELD, Structure
+
+CLOSED = 1e-13
+"""Largest residual of a closed loop, metres (for turns: radians)."""
+
+RANK = 1e-9
+"""Singular values below this fraction of the largest count as zero: an exact redundancy leaves 1e-16."""
+
+NEWTON_STEPS = 20
+LONGEST_STEP = 0.2
+"""Norm over all joints (rad, m) of a step towards a sample; the next bound means little for longer ones."""
+
+CORRECTION = 0.1
+"""A step counts when the correction after it is smaller than this fraction of it: no jump to another assembly."""
+
+NEGLIGIBLE = 1e-7
+"""Corrections below this (rad, m) are rounding, whatever the step."""
+
+SMALLEST_STEP = 1e-4
+"""Fraction of the way to a sample below which the way is taken as blocked."""
+POOL_SPACING = 32
+"""One closed sample in so many is kept as a start for later ones, beside the last one and the home pose."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Closures at one configuration."""
+
+    residual: FloatArray
+    """``(m,)`` metres, radians"""
+    jacobian: FloatArray
+    """``(m, nv)``"""
+
+
+class PinocchioLoops:
+    """The closed loops of one model, with Pinocchio's own numbering of freedoms."""
+
+    def __init__(self, pin: ModuleType, reading: Reading, structure: Structure, compiled: mujoco.MjModel) -> None:
+        self.pin = pin
+        self.model = reading.model
+        self.data = self.model.createData()
+        self.structure = structure
+        self._reading = reading
+        self._reference = np.array(compiled.qpos0)[compiled.jnt_qposadr]
+        owner = {int(compiled.jnt_dofadr[j]): place for j, place in enumerate(reading.joints)}
+        self.actuated = np.array([self.model.idx_vs[owner[int(d)]] for d in structure.actuated])
+        self.actuated_q = np.array([self.model.idx_qs[owner[int(d)]] for d in structure.actuated])
+        self.passive = np.setdiff1d(np.arange(self.model.nv), self.actuated)
+        self.home = self._close_home(self._from_mujoco(structure.home_qpos, compiled))
+
+    def _from_mujoco(self, qpos: FloatArray, compiled: mujoco.MjModel) -> FloatArray:
+        q: FloatArray = self.pin.neutral(self.model)
+        for joint, place in enumerate(self._reading.joints):
+            here, there = int(compiled.jnt_qposadr[joint]), self.model.idx_qs[place]
+            if self.model.nqs[place] == 4:
+                w, x, y, z = qpos[here : here + 4]
+                q[there : there + 4] = x, y, z, w
+            else:
+                q[there] = qpos[here]
+        normal: FloatArray = self.pin.normalize(self.model, q)
+        return normal
+
+    def linear(self, q: FloatArray) -> Linear:
+        """Residual and Jacobian of all closures; leaves frame placements in ``data``."""
+        pin, model, data = self.pin, self.model, self.data
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        rows, residuals = [], []
+        for block, polynomial in zip(self.structure.blocks, self.structure.polynomials, strict=True):
+            kind, one, two = int(block[0]), int(block[3]), int(block[4])
+            if kind in (CONNECT, WELD):
+                a, b = data.oMf[self._reading.sites[one]], data.oMf[self._reading.sites[two]]
+                relative = self.frame_jacobian(one) - self.frame_jacobian(two)
+                rows.append(relative[: 6 if kind == WELD else 3])
+                residuals.append(a.translation - b.translation)
+                if kind == WELD:
+                    residuals.append(pin.log3(a.rotation @ b.rotation.T))
+            elif kind == JOINT:
+                row, open_by = self._joint_row(q, one, two, polynomial)
+                rows.append(row)
+                residuals.append(open_by)
+            elif kind == SPIN:
+                rows.append(self._rod(one, two)[None] @ self.frame_jacobian(one)[3:])
+                residuals.append(np.zeros(1))
+        if not rows:
+            return Linear(np.zeros(0), np.zeros((0, model.nv)))
+        return Linear(np.concatenate(residuals), np.vstack(rows))
+
+    def frame_jacobian(self, site: int) -> FloatArray:
+        """Jacobian ``(6, nv)`` of a site, linear rows first, world axes."""
+        frame = self._reading.sites[site]
+        world_axes = self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobian: FloatArray = self.pin.getFrameJacobian(self.model, self.data, frame, world_axes)
+        return jacobian.reshape(6, -1)  # with one freedom Pinocchio returns a vector
+
+    def _rod(self, site: int, joint: int) -> FloatArray:
+        """The vector from a rod's ball joint to its far end; as long as the rod, so that rows are metres a second."""
+        far, near = self.data.oMf[self._reading.sites[site]], self.data.oMi[self._reading.joints[joint]]
+        rod: FloatArray = far.translation - near.translation
+        return rod
+
+    def _joint_row(self, q: FloatArray, one: int, two: int, c: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """MuJoCo's joint equality: both coordinates count from their reference values."""
+        first = self._reading.joints[one]
+        row = np.zeros((1, self.model.nv))
+        row[0, self.model.idx_vs[first]] = 1.0
+        y = 0.0
+        if two >= 0:
+            second = self._reading.joints[two]
+            y = q[self.model.idx_qs[second]] - self._reference[two]
+            row[0, self.model.idx_vs[second]] = -np.polynomial.polynomial.polyval(y, c[1:] * np.arange(1, 5))
+        value = q[self.model.idx_qs[first]] - self._reference[one] - np.polynomial.polynomial.polyval(y, c)
+        return row, np.array([value])
+
+    def drift(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Second derivative of the closures ``(m,)`` that the velocities alone produce; velocities stay in ``data``."""
+        pin, model, data = self.pin, self.model, self.data
+        pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
+        pin.updateFramePlacements(model, data)
+        out = []
+        for block, c in zip(self.structure.blocks, self.structure.polynomials, strict=True):
+            kind, one, two = int(block[0]), int(block[3]), int(block[4])
+            if kind in (CONNECT, WELD):
+                relative = self.acceleration(one) - self.acceleration(two)
+                out.append(relative[: 6 if kind == WELD else 3])
+            elif kind == JOINT:
+                bend = 0.0
+                if two >= 0:
+                    place = self._reading.joints[two]
+                    y = q[model.idx_qs[place]] - self._reference[two]
+                    curve = c[2:] * np.array([2.0, 6.0, 12.0])
+                    bend = np.polynomial.polynomial.polyval(y, curve) * v[model.idx_vs[place]] ** 2
+                out.append(np.array([-bend]))
+            elif kind == SPIN:
+                # omega . axis = 0 at all times and the axis turns with the rod, so its own rate drops out
+                out.append(np.array([self._rod(one, two) @ self.acceleration(one)[3:]]))
+        return np.concatenate(out) if out else np.zeros(0)
+
+    def acceleration(self, site: int) -> FloatArray:
+        """Acceleration ``(6,)`` of a site's material point, linear first, world axes; needs forward kinematics."""
+        frame = self._reading.sites[site]
+        motion: FloatArray = self.pin.getFrameClassicalAcceleration(
+            self.model, self.data, frame, self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        ).vector
+        return motion
+
+    def solve(self, jacobian: FloatArray, right: FloatArray) -> tuple[FloatArray, int]:
+        """Least-squares passive freedoms for ``jacobian[:, passive] x = right``, and the rank."""
+        x, _, rank, _ = np.linalg.lstsq(jacobian[:, self.passive], right, rcond=RANK)
+        return np.asarray(x, dtype=np.float64), int(rank)
+
+    def close(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Close the loops for actuated coordinates ``(n, na)``, in any order of samples.
+
+        Returns
+        -------
+        tuple
+            Configurations ``(n, nq)``, Pinocchio's order, and residuals ``(n,)``.
+
+        Raises
+        ------
+        MotionError
+            A sample cannot be reached from the home pose without leaving its assembly.
+        """
+        configurations, residuals = np.zeros((len(q), self.model.nq)), np.zeros(len(q))
+        scale = np.maximum(np.ptp(q, axis=0), 1e-9) if len(q) else np.ones(q.shape[1])
+        pool_q, pool = np.empty((len(q) // POOL_SPACING + 2, q.shape[1])), [self.home]
+        pool_q[0] = self.home[self.actuated_q]
+        for sample, aim in enumerate(q):
+            known = pool_q[: len(pool)]
+            nearest = int(np.argmin(np.sum(((known - aim) / scale) ** 2, axis=1)))
+            start = pool[nearest]
+            if sample and np.sum(((q[sample - 1] - aim) / scale) ** 2) < np.sum(((known[nearest] - aim) / scale) ** 2):
+                start = configurations[sample - 1]
+            found = self._reach(start, aim) or self._reach(self.home, aim)
+            if found is None:
+                self._refuse(sample, aim)
+            else:
+                configurations[sample], residuals[sample] = found
+            if sample % POOL_SPACING == 0:
+                pool_q[len(pool)] = aim
+                pool.append(configurations[sample])
+        return configurations, residuals
+
+    def _reach(self, start: FloatArray, aim: FloatArray) -> tuple[FloatArray, float] | None:
+        """Follow the closed configurations from *start* to the actuated coordinates *aim*; None where the way ends."""
+        here, origin = start, start[self.actuated_q]
+        done, step, residual = 0.0, 1.0, 0.0
+        while done < 1.0:
+            part = min(step, 1.0 - done)
+            to = aim if done + part >= 1.0 else origin + (done + part) * (aim - origin)
+            after = self._step(here, to)
+            if after is not None:
+                (here, residual), done, step = after, done + part, 2.0 * step
+            else:
+                step = 0.5 * part
+                if step < SMALLEST_STEP:
+                    return None
+        return here, residual
+
+    def _step(self, here: FloatArray, to: FloatArray) -> tuple[FloatArray, float] | None:
+        """Go along the tangent to the actuated coordinates *to* and close; None where that is no small correction."""
+        velocity = np.zeros(self.model.nv)
+        velocity[self.actuated] = to - here[self.actuated_q]
+        jacobian = self.linear(here).jacobian
+        velocity[self.passive] = self.solve(jacobian, -jacobian[:, self.actuated] @ velocity[self.actuated])[0]
+        moved = float(np.linalg.norm(velocity))
+        if not moved <= LONGEST_STEP:
+            return None
+        predicted = self.pin.integrate(self.model, here, velocity)
+        predicted[self.actuated_q] = to
+        closed, residual = self._newton(predicted)
+        correction = np.linalg.norm(self.pin.difference(self.model, predicted, closed))
+        if residual <= CLOSED and correction <= max(CORRECTION * moved, NEGLIGIBLE):
+            return closed, residual
+        return None
+
+    def _newton(self, q: FloatArray) -> tuple[FloatArray, float]:
+        """Newton on the passive joints until rounding stops it; the best configuration and its residual."""
+        best, least = q, np.inf
+        for _ in range(NEWTON_STEPS):
+            now = self.linear(q)
+            residual = float(np.abs(now.residual).max(initial=0.0))
+            if not residual < least:  # no better, or not a number
+                break
+            best, least = q, residual
+            if residual <= 0.01 * CLOSED:
+                break
+            step = np.zeros(self.model.nv)
+            step[self.passive] = self.solve(now.jacobian, -now.residual)[0]
+            q = self.pin.integrate(self.model, q, step)
+        return best, least
+
+    def _close_home(self, q: FloatArray) -> FloatArray:
+        closed, residual = self._newton(q)
+        file = self.structure.file
+        if not residual <= CLOSED:
+            raise ModelError(
+                f"{file}: Pinocchio cannot close the loops from the home pose; they stay open by {residual:.3g} m"
+                f" (allowed: {CLOSED:g})",
+                file=file,
+                value=residual,
+            )
+        _, rank = self.solve(self.linear(closed).jacobian, np.zeros(self.structure.rows))
+        if rank < len(self.passive):
+            loose = len(self.passive) - rank
+            raise ModelError(
+                f"{file}: {loose} freedom(s) that no actuator holds; add an actuator or a constraint", file=file
+            )
+        return closed
+
+    def _refuse(self, sample: int, aim: FloatArray) -> None:
+        names = self.structure.joint_names
+        shown = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, aim, strict=True))
+        joint = names[int(np.argmax(np.abs(aim - self.home[self.actuated_q])))]
+        raise MotionError(
+            f"sample {sample}, joint {joint}: Pinocchio cannot close the loops at {shown} from the home pose",
+            sample=sample,
+            joint=joint,
+            value=aim.tolist(),
+        )
