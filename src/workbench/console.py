@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable
 from types import TracebackType
 from typing import Any, Self
@@ -16,9 +17,23 @@ from rich.text import Text
 
 from workbench.campaign.compare import Row
 from workbench.campaign.run import Outcome
+from workbench.campaign.verdict import (
+    EXPECTED_FAIL,
+    EXPECTED_FAILURE,
+    FAIL,
+    FAILURES,
+    MEASURED,
+    MODELLING,
+    PASS,
+    UNEXPECTED_PASS,
+    VERIFICATION,
+)
 
 WIDE = 110
 """Columns of a table where there is no terminal to ask, in a log for instance."""
+
+SEEN_AS_PERCENT = 1e-6
+"""Smaller errors show as powers of ten also among percentages."""
 
 
 def _console(stderr: bool) -> Console:
@@ -29,7 +44,10 @@ def _console(stderr: bool) -> Console:
 out = _console(stderr=False)
 err = _console(stderr=True)
 
-STYLES = {"pass": "green", "fail": "bold red", "measured": "cyan"}
+STYLES = {
+    FAIL: "bold red", UNEXPECTED_PASS: "bold red", EXPECTED_FAIL: "yellow", PASS: "green", MEASURED: "cyan",
+}  # fmt: skip
+"""Colour of each verdict; a row of the table shows the first of them that one of its joints has."""
 
 
 class CaseProgress:
@@ -66,13 +84,15 @@ class CaseProgress:
 def print_outcome(outcome: Outcome) -> None:
     """Print the table of errors, the claims, the verdict and where the report lies."""
     manifest = outcome.manifest
-    verification = [row for row in outcome.rows if row.kind == "verification"]
-    modelling = [row for row in outcome.rows if row.kind == "modelling"]
-    joints = manifest["joints"]
-    if verification:
-        out.print(_table("Verification: closed form against MuJoCo, same masses", verification, joints, _scientific))
-    if modelling:
-        out.print(_table("Modelling error: what the simpler mass model costs", modelling, joints, _percent))
+    tables = (
+        (VERIFICATION, "Verification: closed form against MuJoCo, same masses", _scientific),
+        (EXPECTED_FAILURE, "Declared failures: what each mistake costs, joint by joint", _percent),
+        (MODELLING, "Modelling error: what the simpler mass model costs", _percent),
+    )
+    for kind, title, show in tables:
+        rows = [row for row in outcome.rows if row.kind == kind]
+        if rows:
+            out.print(_table(title, rows, manifest["joints"], show))
     out.print(Text("Each error is max|tau - tau_ref| / max|tau_ref| of that joint over the case."), style="dim")
     for name, case in manifest["cases"].items():
         for warning in case["warnings"]:
@@ -82,25 +102,30 @@ def print_outcome(outcome: Outcome) -> None:
         held = sum(claim["holds"] is True for claim in manifest["claims"])
         undecided = len(manifest["claims"]) - held - len(refuted)
         counts = [f"{held} confirmed", f"{len(refuted)} not confirmed", f"{undecided} cannot be decided"]
-        out.print(Text(f"Claims of the paper: {', '.join(c for c in counts if not c.startswith('0 '))}."))
+        out.print(Text(f"Claims: {', '.join(c for c in counts if not c.startswith('0 '))}."))
     for claim in refuted:
         measured, claimed = _quantity(claim["measured"], claim["unit"]), _quantity(claim["claimed"], claim["unit"])
         out.print(Text(f"  not confirmed: {claim['text']}: measured {measured}, printed {claimed} ({claim['source']})"))
-    failed = sum(row.verdict == "fail" for row in verification)
-    out.print(_verdict(outcome, len(verification), failed))
+    out.print(_verdict(outcome))
     out.print(Text(f"Report: {outcome.directory / 'report.html'}"), soft_wrap=True)
 
 
-def _verdict(outcome: Outcome, checks: int, failed: int) -> Text:
+def _verdict(outcome: Outcome) -> Text:
     cases = outcome.manifest["cases"]
-    worst = max((row.peak_error for row in outcome.rows if row.kind == "verification"), default=math.nan)
+    verdicts = Counter(row.verdict for row in outcome.rows)
+    checks, declared = verdicts[PASS] + verdicts[FAIL], verdicts[EXPECTED_FAIL] + verdicts[UNEXPECTED_PASS]
     if outcome.passed:
-        return Text(
-            f"PASSED: {checks} checks in {len(cases)} cases within their bounds; largest error {worst:.2g}.",
-            style="bold green",
+        worst = max((row.peak_error for row in outcome.rows if row.verdict == PASS), default=math.nan)
+        parts = (
+            [f"{checks} checks in {len(cases)} cases within their bounds; largest error {worst:.2g}"] if checks else []
         )
+        parts += [f"{declared} declared failures seen"] if declared else []
+        return Text(f"PASSED: {'; '.join(parts) or 'nothing to judge'}.", style="bold green")
+    parts = [f"{verdicts[FAIL]} of {checks} checks beyond their bounds"] if checks else []
+    if verdicts[UNEXPECTED_PASS]:
+        parts.append(f"{verdicts[UNEXPECTED_PASS]} of {declared} declared failures did not happen")
     names = ", ".join(name for name, case in cases.items() if case["status"] != "passed")
-    return Text(f"FAILED: {failed} of {checks} checks beyond their bounds; cases: {names}.", style="bold red")
+    return Text(f"FAILED: {'; '.join([*parts, f'cases: {names}'])}.", style="bold red")
 
 
 def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any) -> Table:
@@ -120,9 +145,9 @@ def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any) -> Tab
         groups.setdefault((row.case, row.candidate, row.reference), []).append(row)
     previous = ""
     for (case, candidate, reference), members in groups.items():
-        verdict = "fail" if any(r.verdict == "fail" for r in members) else members[0].verdict
+        verdict = next(v for v in STYLES if any(r.verdict == v for r in members))
         cells = [Text(case if case != previous else ""), Text(candidate), Text(reference)]
-        cells += [Text(show(r.peak_error), style="red" if r.verdict == "fail" else "") for r in members]
+        cells += [Text(show(r.peak_error), style="red" if r.verdict in FAILURES else "") for r in members]
         if len(bounds) > 1:
             cells.append(Text("" if members[0].bound is None else f"{members[0].bound:.0e}"))
         table.add_row(*cells, Text(verdict, style=STYLES[verdict]))
@@ -135,7 +160,7 @@ def _scientific(value: float) -> str:
 
 
 def _percent(value: float) -> str:
-    return f"{100 * value:.2f} %"
+    return f"{100 * value:.2f} %" if value >= SEEN_AS_PERCENT or value == 0.0 else _scientific(value)
 
 
 def _quantity(value: float, unit: str) -> str:

@@ -15,6 +15,7 @@ from workbench.campaign import provenance, store
 from workbench.campaign.cases import Case, resolve_cases
 from workbench.campaign.claims import judge_claims
 from workbench.campaign.compare import CaseResult, Row, compute_case
+from workbench.campaign.cost import cost_us
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.errors import WorkbenchError
 from workbench.mechanisms.base import stored_names
@@ -140,7 +141,12 @@ def _manifest(
             for name, info in stored_names(mechanism.parameter_table).items()
         ],
         "candidates": {
-            name: {"mass_model": c.mass_model, "description": c.description, "source": c.source}
+            name: {
+                "mass_model": c.mass_model,
+                "description": c.description,
+                "source": c.source,
+                "cost_us": cost_us(cases[0], name),
+            }
             for name, c in candidates.items()
         },
         "claims": judge_claims(campaign, rows, facts),

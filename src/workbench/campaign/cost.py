@@ -1,0 +1,33 @@
+"""What a closed form costs per sample, measured: the only figures of a run that differ from run to run."""
+
+from __future__ import annotations
+
+import statistics
+import time
+
+import numpy as np
+
+from workbench.campaign.cases import Case
+
+BATCH = 5000
+REPEATS = 7
+BUDGET_S = 0.2
+"""Repeats stop when they have taken this long together."""
+
+
+def cost_us(case: Case, candidate: str) -> float:
+    """Median time of one call over its samples, in microseconds per sample.
+
+    The samples are the case's own, repeated to a batch of `BATCH`; a first call, which may compile, is not counted.
+    """
+    mechanism, motion = case.mechanism, case.motion
+    samples = np.resize(np.arange(len(motion.t)), BATCH)
+    arguments = motion.q[samples], motion.qd[samples], motion.qdd[samples], case.force[samples]
+    function = mechanism.candidates[candidate].function
+    function(mechanism, *arguments)
+    taken: list[float] = []
+    while len(taken) < REPEATS and sum(taken) < BUDGET_S:
+        begun = time.perf_counter()
+        function(mechanism, *arguments)
+        taken.append(time.perf_counter() - begun)
+    return 1e6 * statistics.median(taken) / BATCH
