@@ -61,8 +61,7 @@ class Context:
     @property
     def layout(self) -> Layout:
         """The make-up that the closed form assumes."""
-        layout: Layout = getattr(self.mechanism, "layout")  # noqa: B009 - every mechanism with a model has one
-        return layout
+        return self.mechanism.layout
 
     @property
     def covered(self) -> set[tuple[str, str, str]]:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.errors import ParameterError, did_you_mean
+from workbench.mechanisms.layout import Layout
 
 SIDES = ("left", "right")
 
@@ -137,6 +138,8 @@ class Mechanism(ABC):
     parameter_table: ClassVar[tuple[ParameterInfo, ...]]
     targets: ClassVar[tuple[Target, ...]]
     uniform_rules: ClassVar[tuple[UniformRule, ...]] = ()
+    layout: ClassVar[Layout]
+    """bodies, joints, loops and sites that a model must have"""
     candidates: ClassVar[Mapping[str, Candidate]]
     parameter_type: ClassVar[type]
 
