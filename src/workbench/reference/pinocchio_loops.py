@@ -32,7 +32,7 @@ CORRECTION = 0.1
 NEGLIGIBLE = 1e-7
 """Corrections below this (rad, m) are rounding, whatever the step."""
 
-SMALLEST_STEP = 1e-4
+SMALLEST_STEP = 1e-6
 """Fraction of the way to a sample below which the way is taken as blocked."""
 POOL_SPACING = 32
 """One closed sample in so many is kept as a start for later ones, beside the last one and the home pose."""
