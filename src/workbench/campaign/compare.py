@@ -11,9 +11,9 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case, at_time
 from workbench.campaign.spec import Campaign, CandidateSpec
+from workbench.campaign.unloaded import joint_error, largest_reaction
 from workbench.campaign.verdict import FAILURES, kind_of, verdict_of
 from workbench.errors import ArrayError, MotionError
-from workbench.metrics import relative_error
 from workbench.reference import MujocoReference, ReferenceResult
 
 KINEMATICS_BOUND = 1e-11
@@ -77,7 +77,7 @@ def compute_case(campaign: Campaign, case: Case) -> CaseResult:
     rows = [
         row
         for candidate in campaign.candidate
-        for row in _rows(case, candidate, torques[candidate.name], results[candidate.reference].tau)
+        for row in _rows(case, candidate, torques[candidate.name], results[candidate.reference])
     ]
     for mass_model, result in results.items():
         series |= _columns(f"ref_{mass_model}", result.tau, mechanism.joints)
@@ -90,10 +90,11 @@ def compute_case(campaign: Campaign, case: Case) -> CaseResult:
     return CaseResult(case.name, rows, series, _facts(case, reference, first, rows))
 
 
-def _rows(case: Case, candidate: CandidateSpec, tau: FloatArray, reference: FloatArray) -> list[Row]:
+def _rows(case: Case, candidate: CandidateSpec, tau: FloatArray, reference: ReferenceResult) -> list[Row]:
     rows = []
+    reaction = largest_reaction(reference.reactions.values())
     for i, joint in enumerate(case.mechanism.joints):
-        error = relative_error(tau[:, i], reference[:, i])
+        error = joint_error(tau[:, i], reference.tau[:, i], reaction)
         rows.append(
             Row(
                 case=case.name,
