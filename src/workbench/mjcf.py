@@ -161,6 +161,7 @@ def load_model(path: str | Path, overrides: Mapping[str, float] | None = None) -
             f'{file}: parameters cannot be set, <custom> has no <text name="mechanism"> that says what they mean',
             file=file,
         )
+    refuse_huge(overrides)
     wanted = changed_parameters(base.kind, base.values, overrides)
     loaded = load_text(rewrite(text, file, base.kind, base.values, wanted, base.elements), file)
     confirm(loaded, wanted)
@@ -234,6 +235,19 @@ def edit_text(
         A missing element, an unknown name, a value that is not allowed.
     """
     return rewrite(text, file, mechanism, values, changed_parameters(mechanism, values, changes))
+
+
+def refuse_huge(values: Mapping[str, float]) -> None:
+    """Refuse numbers that MuJoCo does not hold, before anything is computed from them.
+
+    Raises
+    ------
+    ParameterError
+        A magnitude above `LARGEST_NUMBER`. What is no number at all is left to the parameter table.
+    """
+    for name, value in values.items():
+        if isinstance(value, int | float) and abs(value) > LARGEST_NUMBER and abs(value) < float("inf"):
+            raise ParameterError(f"parameter {name} = {value:g}; allowed: at most {LARGEST_NUMBER:g}", parameter=name)
 
 
 def confirm(loaded: LoadedModel, wanted: Mapping[str, float]) -> None:

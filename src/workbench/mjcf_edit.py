@@ -13,7 +13,7 @@ from pathlib import Path
 
 from workbench.errors import ModelError, OutputError, ParameterError
 from workbench.mechanisms.base import Mechanism, changed_parameters, expand_names, stored_names
-from workbench.mjcf import LoadedModel, confirm, find_model, load_model, load_text
+from workbench.mjcf import LoadedModel, confirm, find_model, load_model, load_text, refuse_huge
 from workbench.mjcf_values import rewrite
 
 ASSIGNMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*([*/+-]?=)\s*(\S+)\s*")
@@ -106,6 +106,7 @@ def resolve_changes(
         names = expand_names(mechanism.parameter_table, {change.name: 0.0})
         for name in names:
             result[name] = OPERATIONS[change.operator](values[name], change.number) + 0.0
+    refuse_huge(result)
     return result
 
 
