@@ -1,0 +1,220 @@
+"""Power balance: what the actuators and the external force put in must be stored or dissipated.
+
+At every instant ``tau . qd + f . xd = dE/dt + dissipation``. The energy E is MuJoCo's own and is differentiated
+numerically along a short piece of motion that has the sample's velocity and acceleration. Nothing of the projection
+that yields tau enters the right-hand side: no constraint acceleration, no bias force, no multiplier. A wrong torque, a
+lost sign or a lost body therefore shows here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from workbench.arrays import FloatArray, as_batch, as_batches, as_force
+from workbench.errors import ArrayError, MotionError
+from workbench.reference.mujoco_reference import MujocoReference
+
+MOST_SAMPLES = 150
+"""Samples looked at; a longer motion is thinned out evenly, and the samples of greatest power are always kept."""
+
+PEAKS = 30
+"""How many of them are those of greatest power."""
+
+FIRST_STEP = 0.04
+"""First difference step as a fraction of the motion's time scale. Truncation falls with the eighth power of the step and
+rounding grows with its inverse; over the bundled campaigns they meet at 0.01 to 0.04, near a singular pose lower."""
+
+HALVINGS = 6
+"""How often a sample's step is halved at most, in search of the step where truncation meets rounding."""
+
+CLOSE_ENOUGH = 1e-13
+"""A sample is done when halving its step changes dE/dt by less than this fraction of the greatest |dE/dt|."""
+
+FARTHEST = 0.3
+"""Metres or radians: at the greatest speed the time scale is no longer than it takes to go so far, so that a motion
+without acceleration has a time scale too."""
+
+SHRINKINGS = 6
+"""How often the first step is halved where a displaced sample leaves the workspace."""
+
+WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
+"""Eighth-order central difference: the weights of f(+k h) - f(-k h), k = 1 to 4."""
+
+
+@dataclass(frozen=True)
+class PowerBalance:
+    """Power balance of m of the n samples; arrays ``(m,)`` in watts unless said otherwise."""
+
+    samples: np.ndarray
+    """which of the n samples, ``(m,)``, increasing"""
+    residual: FloatArray
+    """tau . qd + f . xd - dE/dt - dissipation"""
+    actuators: FloatArray
+    """tau . qd"""
+    external: FloatArray
+    """f . xd"""
+    storage: FloatArray
+    """dE/dt, kinetic and potential"""
+    dissipation: FloatArray
+    """damping qvel^2 + frictionloss |qvel|, summed over all freedoms, passive and ball ones too; never negative"""
+    peak_power: float
+    """max |tau . qd| over all n samples, the normaliser, W"""
+    relative: float
+    """max |residual| / peak_power; NaN in the torques gives NaN, which satisfies no bound"""
+    worst_sample: int
+    """index into the n samples of the largest |residual|"""
+    differentiation: float
+    """how far dE/dt at two neighbouring steps differs, over peak_power: what `relative` cannot be expected to go below"""
+
+
+def power_balance(
+    reference: MujocoReference,
+    q: ArrayLike,
+    qd: ArrayLike,
+    qdd: ArrayLike,
+    mass_model: str = "distributed",
+    external_force: ArrayLike | None = None,
+    tau: ArrayLike | None = None,
+) -> PowerBalance:
+    """Hold torques against the rate of MuJoCo's energy.
+
+    Parameters
+    ----------
+    reference
+        The robot.
+    q, qd, qdd
+        Actuated position, velocity, acceleration, each ``(n, na)``, SI; samples need not form a trajectory.
+    mass_model
+        ``"distributed"`` or ``"lumped"``: whose energy is taken.
+    external_force
+        Newtons, paper frame, acting on the platform: ``(3,)`` or ``(n, 3)``.
+    tau
+        Torques to judge, ``(n, na)``; None judges the reference's own.
+
+    Raises
+    ------
+    MotionError
+        As `MujocoReference.inverse_dynamics`.
+    ArrayError
+        Wrong shapes, no samples, or q, qd, qdd that are not finite.
+    """
+    na = len(reference.joint_names)
+    q, qd, qdd = as_batches(na, q=q, qd=qd, qdd=qdd)
+    if not len(q):
+        raise ArrayError("q: expected at least one sample, got none")
+    force = as_force("external_force", external_force, len(q))
+    result = reference.inverse_dynamics(q, qd, qdd, mass_model, force)
+    torques = result.tau if tau is None else _same_shape(tau, q)
+    power = np.sum(torques * qd, axis=1)
+    peak = float(np.abs(power).max())
+    kept = _selection(power)
+    storage, doubt = _energy_rate(reference, q[kept], qd[kept], qdd[kept], mass_model)
+    model = reference.compiled(mass_model)
+    qvel = result.qvel[kept]
+    dissipation = qvel**2 @ np.asarray(model.dof_damping) + np.abs(qvel) @ np.asarray(model.dof_frictionloss)
+    external = np.sum(force[kept] * result.xd[kept], axis=1)
+    residual = power[kept] + external - storage - dissipation
+    size = np.abs(residual)
+    return PowerBalance(
+        samples=kept,
+        residual=residual,
+        actuators=power[kept],
+        external=external,
+        storage=storage,
+        dissipation=dissipation,
+        peak_power=peak,
+        relative=_ratio(float(size.max()), peak),
+        worst_sample=int(kept[int(np.argmax(np.where(np.isnan(size), np.inf, size)))]),
+        differentiation=_ratio(float(doubt.max()), peak),
+    )
+
+
+def _same_shape(tau: ArrayLike, q: FloatArray) -> FloatArray:
+    # a candidate may return NaN: that is a finding, not a wrong argument
+    torques = np.asarray(tau, dtype=np.float64)
+    if torques.shape != q.shape:
+        as_batch("tau", np.where(np.isfinite(torques), torques, 0.0), q.shape[1])
+        raise ArrayError(f"tau: expected shape {q.shape}, got {torques.shape}", argument="tau", shape=torques.shape)
+    return torques
+
+
+def _selection(power: FloatArray) -> np.ndarray:
+    n = len(power)
+    if n <= MOST_SAMPLES:
+        return np.arange(n)
+    even = np.round(np.linspace(0, n - 1, MOST_SAMPLES - PEAKS)).astype(np.int64)
+    greatest = np.argsort(-np.abs(power), kind="stable")[:PEAKS]
+    return np.unique(np.concatenate([even, greatest]))
+
+
+def time_scale(qd: FloatArray, qdd: FloatArray) -> float:
+    """Seconds in which the fastest-changing joint changes its speed by its greatest speed; inf at rest.
+
+    The least of max|qd_j| / max|qdd_j| over the joints, and of `FARTHEST` / max|qd|.
+    """
+    speed, acceleration = np.abs(qd).max(axis=0), np.abs(qdd).max(axis=0)
+    if not speed.any():
+        return float("inf")
+    moving = (speed > 0.0) & (acceleration > 0.0)
+    changes = speed[moving] / acceleration[moving]
+    return float(min(changes.min(initial=np.inf), FARTHEST / speed.max()))
+
+
+def _energy_rate(
+    reference: MujocoReference, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str
+) -> tuple[FloatArray, FloatArray]:
+    """Return dE/dt ``(m,)`` and how far it is in doubt, both in watts."""
+    scale = time_scale(qd, qdd)
+    if not np.isfinite(scale):
+        return np.zeros(len(q)), np.zeros(len(q))
+    step = FIRST_STEP * scale
+    for attempt in range(SHRINKINGS + 1):
+        try:
+            rate = _difference(reference, q, qd, qdd, mass_model, step)
+            break
+        except MotionError:
+            # a displaced sample beyond the edge of the workspace; the samples themselves were closed before
+            if attempt == SHRINKINGS:
+                raise
+            step *= 0.5
+    best, doubt = rate.copy(), np.full(len(q), np.inf)
+    estimate = rate.copy()
+    active = np.arange(len(q))
+    for _ in range(HALVINGS):
+        step *= 0.5
+        finer = _difference(reference, q[active], qd[active], qdd[active], mass_model, step)
+        # Richardson: the error of the eighth-order difference falls by 2^8 with each halving
+        refined = finer + (finer - rate[active]) / 255.0
+        gap = np.abs(refined - estimate[active])
+        rate[active], estimate[active] = finer, refined
+        better = gap < doubt[active]
+        best[active[better]], doubt[active[better]] = refined[better], gap[better]
+        # where the gap grows again, rounding has taken over
+        active = active[better & (gap > CLOSE_ENOUGH * np.abs(rate).max())]
+        if not len(active):
+            break
+    return best, doubt
+
+
+def _difference(
+    reference: MujocoReference, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, step: float
+) -> FloatArray:
+    """Eighth-order central difference of the energy along q + qd t + qdd t^2/2."""
+    n = len(q)
+    times = step * np.array([sign * k for k in range(1, len(WEIGHTS) + 1) for sign in (1, -1)])[:, None, None]
+    # sample after sample, so that the closure starts each from a neighbour
+    moved = (q + qd * times + 0.5 * qdd * times**2).swapaxes(0, 1).reshape(-1, q.shape[1])
+    speed = (qd + qdd * times).swapaxes(0, 1).reshape(-1, q.shape[1])
+    still = np.zeros_like(moved)
+    energy = reference.inverse_dynamics(moved, speed, still, mass_model).energy.sum(axis=1).reshape(n, len(WEIGHTS), 2)
+    rate: FloatArray = (energy[:, :, 0] - energy[:, :, 1]) @ np.array(WEIGHTS) / step
+    return rate
+
+
+def _ratio(numerator: float, denominator: float) -> float:
+    if denominator == 0.0:
+        return 0.0 if numerator == 0.0 else float("inf")
+    return numerator / denominator
