@@ -7,7 +7,6 @@ errors.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,16 +15,16 @@ from numpy.typing import ArrayLike
 from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.errors import MotionError, ParameterError
 from workbench.mechanisms import asym_2rss_ppap_kernel as kernel
-from workbench.mechanisms import asym_2rss_ppap_literal as literal
+from workbench.mechanisms.asym_2rss_ppap_candidates import CANDIDATES
 from workbench.mechanisms.asym_2rss_ppap_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
-from workbench.mechanisms.base import Candidate, Mechanism, ParameterInfo, Target, UniformRule
+from workbench.mechanisms.base import Mechanism, ParameterInfo, Target, UniformRule
 from workbench.mechanisms.layout import Layout
+from workbench.mechanisms.mass_models import mass_model as mass_model_of
 
 SINGULAR = 1e-6
 """A pose counts as singular when a determinant, divided by the lengths it is made of, is below this: torques there are
 a million times the forces that cause them."""
 
-BAR_INERTIA = {"distributed": 1.0, "lumped": 0.0}
 ELBOWS = ("out", "in")
 
 
@@ -48,7 +47,7 @@ class Asym2rssPpap(Mechanism):
     def __init__(self, parameters: Any) -> None:
         """Build from `Parameters`; see `Mechanism`."""
         super().__init__(parameters)
-        self._constants = {model: kernel.pack(parameters, factor) for model, factor in BAR_INERTIA.items()}
+        self._constants = {model: kernel.pack(parameters, mass_model_of(model)) for model in self.mass_models}
 
     def forward_kinematics(self, q: ArrayLike) -> FloatArray:
         """Platform position on the branch where the platform hangs (larger x3); [Almeida2010] eq. (1).
@@ -118,9 +117,7 @@ class Asym2rssPpap(Mechanism):
         zero = np.zeros_like(array)
         return self._motion(array, zero, zero)[3]
 
-    def platform_motion(
-        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def platform_motion(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Position, velocity and acceleration of the platform, each ``(n, 3)``, SI, paper frame."""
         x, xd, xdd, _, _ = self._motion(*as_batches(q=q, qd=qd, qdd=qdd))
         return x, xd, xdd
@@ -145,7 +142,7 @@ class Asym2rssPpap(Mechanism):
             tip = np.stack([still, side * (base + a1 * cosine), a1 * sine], axis=1)
             tangent = np.stack([still, -side * a1 * sine, a1 * cosine], axis=1)
             inward = np.stack([still, -side * a1 * cosine, -a1 * sine], axis=1)
-            rod = points + [0.0, side * platform, 0.0] - tip
+            rod = points + np.array([0.0, side * platform, 0.0]) - tip
             lever = np.sum(rod * tangent, axis=1)
             short = np.abs(lever) < SINGULAR * a1 * np.linalg.norm(rod, axis=1)
             self._refuse(short, joint, "singular pose: arm and rod in line (J_q)", points, "x")
@@ -165,7 +162,12 @@ class Asym2rssPpap(Mechanism):
     def torques(
         self, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, external_force: FloatArray
     ) -> FloatArray:
-        """Inverse dynamics on checked arrays; see `Mechanism.inverse_dynamics`."""
+        """Inverse dynamics on checked arrays; see `Mechanism.inverse_dynamics`.
+
+        *mass_model* may be any that `workbench.mechanisms.mass_models.mass_model` knows.
+        """
+        if mass_model not in self._constants:
+            self._constants[mass_model] = kernel.pack(self._parameters, mass_model_of(mass_model))
         tau = np.empty_like(q)
         kernel.torques_batch(self._constants[mass_model], q, qd, qdd, external_force, tau)
         if not np.isfinite(tau).all():
@@ -213,40 +215,4 @@ class Asym2rssPpap(Mechanism):
             )
 
 
-def _kernel_candidate(mass_model: str) -> Candidate:
-    return Candidate(
-        name=mass_model,
-        mass_model=mass_model,
-        function=lambda mech, q, qd, qdd, force: mech.inverse_dynamics(q, qd, qdd, mass_model, force),
-        description=f"virtual work in end-point coordinates, {mass_model} masses",
-        source="docs/derivations/asym_2rss_ppap.md",
-    )
-
-
-def _literal_candidate(name: str, mass_model: str, function: Any, description: str, source: str) -> Candidate:
-    def torques(
-        mech: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray
-    ) -> FloatArray:
-        result: FloatArray = function(
-            mech.parameters, q, qd, qdd, *mech.platform_motion(q, qd, qdd), external_force=external_force
-        )
-        return result
-
-    return Candidate(name, mass_model, torques, description, source)
-
-
-Asym2rssPpap.candidates = {
-    candidate.name: candidate
-    for candidate in (
-        _kernel_candidate("lumped"),
-        _kernel_candidate("distributed"),
-        _literal_candidate(
-            "lumped-appendix", "lumped", literal.lumped_appendix, "K1 to K6 of the appendix, repaired",
-            "[Almeida2010] appendix",
-        ),
-        _literal_candidate(
-            "distributed-rotation", "distributed", literal.distributed_rotation,
-            "rotation matrices and angular accelerations", "[Almeida2010] eq. (4)-(15)",
-        ),
-    )
-}  # fmt: skip
+Asym2rssPpap.candidates = CANDIDATES

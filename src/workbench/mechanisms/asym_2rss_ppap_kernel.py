@@ -8,8 +8,8 @@ spin about its axis has the constant mass matrix
      [m k (1-k) - I/len^2,  m k^2 + I/len^2    ]]
 
 with mass m, mass centre at the fraction k and transverse inertia I (docs/derivations/asym_2rss_ppap.md, section 4).
-Lumped masses are I = 0. Frame: the paper's, x3 down. Points A, C, E belong to the left limb, B, D, F to the right one;
-u = E - C and w = F - D are the rods. Numbers follow docs/notation.md.
+Lumped masses are I = 0; `mass_models` has more. Frame: the paper's, x3 down. Points A, C, E belong to the left limb, B,
+D, F to the right one; u = E - C and w = F - D are the rods. Numbers follow docs/notation.md.
 """
 
 from __future__ import annotations
@@ -21,23 +21,31 @@ import numpy as np
 from numba import njit
 
 from workbench.arrays import FloatArray
+from workbench.mechanisms.mass_models import MASS_MODELS, Bar, MassModel
 
 CONSTANTS = 21
 
 
-def pack(p: Any, bar_inertia: float = 1.0) -> FloatArray:
+def pack(p: Any, model: MassModel = MASS_MODELS["distributed"]) -> FloatArray:
     """Return the kernel's constants from the parameters.
 
     Parameters
     ----------
     p
         Parameters of the mechanism (`workbench.mechanisms.asym_2rss_ppap.Parameters`), SI.
-    bar_inertia
-        Factor on every bar's rotational inertia: 1 for distributed masses, 0 for lumped ones.
+    model
+        What every bar weighs at its ends.
+
+    Raises
+    ------
+    ParameterError
+        A bar that the mass model cannot represent.
     """
-    i1_left, i1_right = bar_inertia * p.I1_left / p.a1_left**2, bar_inertia * p.I1_right / p.a1_right**2
-    i2_left, i2_right = bar_inertia * p.I2_left / p.a2_left**2, bar_inertia * p.I2_right / p.a2_right**2
-    i5 = bar_inertia * p.I5 / p.a5**2
+    arm_left = model.others(Bar(p.m1_left, p.I1_left, p.a1_left, p.k1_left))
+    arm_right = model.others(Bar(p.m1_right, p.I1_right, p.a1_right, p.k1_right))
+    rod_left = model.rods(Bar(p.m2_left, p.I2_left, p.a2_left, p.k2_left))
+    rod_right = model.rods(Bar(p.m2_right, p.I2_right, p.a2_right, p.k2_right))
+    swing = model.others(Bar(p.m5, p.I5, p.a5, p.k5))
     constants = (
         p.L_left - p.l_left,
         p.L_right - p.l_right,
@@ -46,24 +54,24 @@ def pack(p: Any, bar_inertia: float = 1.0) -> FloatArray:
         p.a2_left**2,
         p.a2_right**2,
         # left limb: C with C (arm and rod), C with E, E with E, weight at C
-        p.m1_left * p.k1_left**2 + i1_left + p.m2_left * (1 - p.k2_left) ** 2 + i2_left,
-        p.m2_left * p.k2_left * (1 - p.k2_left) - i2_left,
-        p.m2_left * p.k2_left**2 + i2_left,
-        p.g * (p.m1_left * p.k1_left + p.m2_left * (1 - p.k2_left)),
+        arm_left.distal + rod_left.proximal,
+        rod_left.coupling,
+        rod_left.distal,
+        p.g * (arm_left.weight_distal + rod_left.weight_proximal),
         # right limb: D with D, D with F, F with F, weight at D
-        p.m1_right * p.k1_right**2 + i1_right + p.m2_right * (1 - p.k2_right) ** 2 + i2_right,
-        p.m2_right * p.k2_right * (1 - p.k2_right) - i2_right,
-        p.m2_right * p.k2_right**2 + i2_right,
-        p.g * (p.m1_right * p.k1_right + p.m2_right * (1 - p.k2_right)),
+        arm_right.distal + rod_right.proximal,
+        rod_right.coupling,
+        rod_right.distal,
+        p.g * (arm_right.weight_distal + rod_right.weight_proximal),
         # platform with payload; all weight that hangs on the platform
         p.m3 + p.payload,
-        p.g * (p.m3 + p.payload + p.m2_left * p.k2_left + p.m2_right * p.k2_right),
+        p.g * (p.m3 + p.payload + rod_left.weight_distal + rod_right.weight_distal),
         # what travels along x1 only with q1: slider, parallelogram, coupler
         p.m4 + p.m5 + p.m6,
         # swing of the parallelogram: squared length, inertia at the coupler, weight at the coupler
         p.a5**2,
-        p.m5 * p.k5**2 + i5 + p.m6,
-        p.g * (p.m5 * p.k5 + p.m6),
+        swing.distal + p.m6,
+        p.g * (swing.weight_distal + p.m6),
         0.0,
     )
     return np.array(constants, dtype=np.float64)
