@@ -22,16 +22,22 @@ from workbench.reference.structure import Structure
 CLOSED = 1e-13
 """Largest residual of a closed loop, metres (for turns: radians)."""
 
-CORRECTION = 0.2
+CORRECTION = 0.1
 """A continuation step is accepted when Newton moves the configuration by less than this fraction of the step."""
+
+LONGEST_STEP = 0.2
+"""rad or m, over all joints: a longer step can land on another branch and still look like a good one."""
 
 NEGLIGIBLE = 1e-7
 """Corrections below this (rad, m) are accepted whatever the step: they are rounding, not another branch."""
 
-SMALLEST_STEP = 1e-4
+SMALLEST_STEP = 1e-6
 """Fraction of the way from the start to a sample; a smaller step means that the way is blocked."""
 
 NEWTON_STEPS = 8
+ASTRAY = 1e3
+"""A residual (m) from which Newton does not come back."""
+
 FREE_STEPS = 60
 LONGEST_FREE_STEP = 0.2
 """rad or m: damped, so that an open home pose closes on the branch that it is nearest to."""
@@ -65,12 +71,12 @@ class LoopCloser:
         q_home = home[:, structure.actuated_qpos]
         closed, done, residual = self._newton(home.copy(), q_home, np.zeros(1, dtype=np.int64))
         if not done[0]:
-            # edited lengths can put the file's home pose out of reach: move the actuated joints too, as little as needed
+            # edited lengths can put the file's home pose out of reach: move the actuated joints too, but little
             closed, residual = self._close_freely(home.copy())
             if not residual[0] <= CLOSED:
                 raise ModelError(
-                    f"{structure.file}: the loops cannot be closed from the home pose; {self._worst_block(closed)} stays"
-                    f" open by {residual[0]:.3g} m (allowed: {CLOSED:g})",
+                    f"{structure.file}: the loops cannot be closed from the home pose; {self._worst_block(closed)}"
+                    f" stays open by {residual[0]:.3g} m (allowed: {CLOSED:g})",
                     file=structure.file,
                     value=float(residual[0]),
                 )
@@ -111,12 +117,17 @@ class LoopCloser:
             here, way = qpos[active], target[active] - origin[active]
             part = np.minimum(step[active], 1.0 - done[active])
             change = way * part[:, None]
-            aim = np.where((done[active] + part >= 1.0)[:, None], target[active], origin[active] + way * (done[active] + part)[:, None])
+            aim = np.where(
+                (done[active] + part >= 1.0)[:, None],
+                target[active],
+                origin[active] + way * (done[active] + part)[:, None],
+            )
             predicted, moved = self._step(here, change)
             predicted[:, structure.actuated_qpos] = aim
             closed, success, error = self._newton(predicted, aim, np.arange(len(active)))
             correction = self._distance(closed, predicted)
-            accepted = success & (correction <= np.maximum(CORRECTION * moved, NEGLIGIBLE))
+            small = correction <= np.maximum(CORRECTION * moved, NEGLIGIBLE)
+            accepted = success & small & (moved <= LONGEST_STEP)
             moving = active[accepted]
             qpos[moving] = closed[accepted]
             residual[moving] = error[accepted]
@@ -152,9 +163,7 @@ class LoopCloser:
             integrate(qpos[i], steps[i], *self.joints, out[i])
         return out, np.sqrt(np.sum(steps**2, axis=1))
 
-    def _newton(
-        self, qpos: FloatArray, q: FloatArray, ids: np.ndarray
-    ) -> tuple[FloatArray, np.ndarray, FloatArray]:
+    def _newton(self, qpos: FloatArray, q: FloatArray, ids: np.ndarray) -> tuple[FloatArray, np.ndarray, FloatArray]:
         """Newton on the passive joints; returns configurations, success and residuals."""
         qpos = qpos.copy()
         qpos[:, self.structure.actuated_qpos] = q
@@ -170,7 +179,9 @@ class LoopCloser:
             kept[better] = qpos[better]
             best[better] = residual[better]
             # a closed sample gets one more step, which takes it to the floor of rounding; then it stays
-            active = active[(residual[active] > 0.01 * CLOSED) & (residual[active] < 1e3) & (residual[active] <= best[active])]
+            active = active[
+                (residual[active] > 0.01 * CLOSED) & (residual[active] < ASTRAY) & (residual[active] <= best[active])
+            ]
             if not len(active):
                 break
             for i in active:
@@ -200,8 +211,8 @@ class LoopCloser:
         joint = int(np.argmax(np.abs(q - reached)))
         shown = ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.structure.joint_names, q, strict=True))
         raise MotionError(
-            f"sample {sample}, joint {self.structure.joint_names[joint]}: the loops cannot be closed at {shown}; the way"
-            f" from the home pose ends at {reached[joint]:.6g}",
+            f"sample {sample}, joint {self.structure.joint_names[joint]}: the loops cannot be closed at {shown}; the"
+            f" way from the home pose ends at {reached[joint]:.6g}",
             sample=sample,
             joint=self.structure.joint_names[joint],
             value=q.tolist(),
@@ -233,6 +244,6 @@ def constraint_jacobian(
 
 def _nearest(points: FloatArray, seeds: FloatArray) -> np.ndarray:
     """Index of the nearest seed for each point; a tree, so that memory stays linear in the number of samples."""
-    from scipy.spatial import cKDTree  # noqa: PLC0415 - scipy.spatial is slow to import and not always needed
+    from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(seeds).query(points)[1])

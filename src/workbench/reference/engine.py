@@ -21,10 +21,16 @@ def without_bar_inertia(text: str, bodies: tuple[str, ...]) -> mujoco.MjModel:
     The specification is changed and compiled again; writing into a compiled model can be silently wrong.
     """
     spec = mujoco.MjSpec.from_string(text)
+    model = spec.compile()
     for name in bodies:
-        body = spec.body(name)
-        body.inertia = [LUMPED_INERTIA] * 3
+        body, index = spec.body(name), model.body(name).id
+        # the compiled mass and mass centre, since the file may leave both to its geoms
+        body.explicitinertial = True
+        body.mass = model.body_mass[index]
+        body.ipos = model.body_ipos[index]
         body.iquat = [1.0, 0.0, 0.0, 0.0]
+        body.fullinertia = [np.nan] * 6
+        body.inertia = [LUMPED_INERTIA] * 3
     return spec.compile()
 
 
@@ -84,7 +90,9 @@ class Engine:
         names = ("cdof_dot", "M", "qfrc_bias", "xpos", "xipos", "ximat", "energy", "qfrc_passive")
         cdof_dot, mass, bias, xpos, xipos, ximat, energy, passive = (batch.bind(f) for f in names)
         batch.forward(stage=mujoco.mjtStage.mjSTAGE_VEL.value)
-        return Dynamics(cdof_dot.copy(), mass.copy(), bias - passive, xpos.copy(), xipos.copy(), ximat.copy(), energy.copy())
+        return Dynamics(
+            cdof_dot.copy(), mass.copy(), bias - passive, xpos.copy(), xipos.copy(), ximat.copy(), energy.copy()
+        )
 
 
 def mass_layout(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:

@@ -57,7 +57,7 @@ def rows_sample(  # type: ignore[no-untyped-def]
     for k in range(blocks.shape[0]):
         kind, b1, b2, s1, s2 = blocks[k, 0], blocks[k, 1], blocks[k, 2], blocks[k, 3], blocks[k, 4]
         row = block_rows[k]
-        if kind == CONNECT or kind == WELD:
+        if kind in (CONNECT, WELD):
             _point_row(cdof, com[root[b1]], moves, b1, site_xpos[s1], 1.0, row, jac)
             _point_row(cdof, com[root[b2]], moves, b2, site_xpos[s2], -1.0, row, jac)
             for i in range(3):
@@ -118,7 +118,7 @@ def acceleration_rows(  # type: ignore[no-untyped-def]
     for k in range(blocks.shape[0]):
         kind, b1, b2, s1, s2 = blocks[k, 0], blocks[k, 1], blocks[k, 2], blocks[k, 3], blocks[k, 4]
         row = block_rows[k]
-        if kind == CONNECT or kind == WELD:
+        if kind in (CONNECT, WELD):
             _body_acceleration(cdof, cdof_dot, qvel, qacc, moves, b1, v1, a1)
             _body_acceleration(cdof, cdof_dot, qvel, qacc, moves, b2, v2, a2)
             _point_acceleration(v1, a1, com[root[b1]], site_xpos[s1], dummy, p1)

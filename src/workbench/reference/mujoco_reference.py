@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -177,6 +178,8 @@ class MujocoReference:
         structure = self._structure
         q, qd, qdd = as_batches(len(structure.actuated), q=q, qd=qd, qdd=qdd)
         n = len(q)
+        if n == 0:
+            return self._no_samples(mass_model)
         force = as_force("external_force", external_force, n) @ self._base_rotation.T
         engine = self._engine(mass_model)
         nv = engine.model.nv
@@ -211,6 +214,17 @@ class MujocoReference:
             velocity_residual=velocity_residual, acceleration_residual=acceleration_residual, rank=rank,
             condition=condition, energy=dynamics.energy, qpos=qpos, qvel=qvel, qacc=qacc,
         )  # fmt: skip
+
+    def _no_samples(self, mass_model: str) -> ReferenceResult:
+        """The result of an empty batch, with the shapes of any other."""
+        home = self._closer.home[None, self._structure.actuated_qpos]
+        one = self.inverse_dynamics(home, 0 * home, 0 * home, mass_model)
+        arrays = {
+            field.name: {name: force[:0] for name, force in value.items()} if isinstance(value, dict) else value[:0]
+            for field in dataclasses.fields(one)
+            for value in [getattr(one, field.name)]
+        }
+        return ReferenceResult(**arrays)
 
     def _engine(self, mass_model: str) -> Engine:
         if mass_model not in MASS_MODELS:
@@ -264,8 +278,8 @@ class MujocoReference:
             direction = np.abs(vectors[-1])
             joint = self._structure.dof_names[self._structure.passive[int(np.argmax(direction))]]
             raise ModelError(
-                f'{self.file}: {loose} freedom(s) that no actuator holds, most of it in joint "{joint}"; add an actuator'
-                " or a constraint",
+                f'{self.file}: {loose} freedom(s) that no actuator holds, most of it in joint "{joint}"; add an'
+                " actuator or a constraint",
                 file=self.file,
                 joint=joint,
             )

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError
@@ -24,7 +25,7 @@ ROWS = {CONNECT: 3, WELD: 6, JOINT: 1, SPIN: 1}
 
 @dataclass(frozen=True)
 class Structure:
-    """Integer tables of one model; ``blocks`` is ``(k, 5)``: kind, body 1, body 2, site 1, site 2 (joint ids for JOINT)."""
+    """Tables of one model; ``blocks`` is ``(k, 5)``: kind, body 1, body 2, site 1, site 2 (joints for JOINT)."""
 
     file: str
     actuated: IntArray
@@ -143,7 +144,7 @@ def _closures(
         one, two = int(model.eq_obj1id[eq]), int(model.eq_obj2id[eq])
         if kind == JOINT:
             blocks.append((JOINT, 0, 0, one, two))
-            polynomials.append(np.array(model.eq_data[eq, :5], dtype=np.float64))
+            polynomials.append(_absolute_polynomial(model, eq, one, two))
         else:
             if mujoco.mjtObj(model.eq_objtype[eq]) != mujoco.mjtObj.mjOBJ_SITE:
                 raise ModelError(
@@ -156,6 +157,17 @@ def _closures(
             polynomials.append(np.zeros(5))
         names.append(name)
     return blocks, names, polynomials
+
+
+def _absolute_polynomial(model: mujoco.MjModel, eq: int, one: int, two: int) -> FloatArray:
+    """Coefficients ``(5,)`` of a joint equality in the coordinates themselves; MuJoCo counts both from qpos0."""
+    coefficients = Polynomial(np.array(model.eq_data[eq, :5], dtype=np.float64))
+    if two >= 0:
+        coefficients = coefficients(Polynomial([-float(model.qpos0[model.jnt_qposadr[two]]), 1.0]))
+    absolute = np.zeros(5)
+    absolute[: len(coefficients.coef)] = coefficients.coef
+    absolute[0] += model.qpos0[model.jnt_qposadr[one]]
+    return absolute
 
 
 def _idle_rods(model: mujoco.MjModel, blocks: list[tuple[int, int, int, int, int]]) -> list[tuple[int, int]]:
