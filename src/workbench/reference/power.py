@@ -24,7 +24,7 @@ PEAKS = 30
 """How many of them are those of greatest power."""
 
 FIRST_STEP = 0.04
-"""First difference step as a fraction of the motion's time scale. Truncation falls with the eighth power of the step and
+"""First difference step as a fraction of the motion's time scale. Truncation falls with a high power of the step and
 rounding grows with its inverse; over the bundled campaigns they meet at 0.01 to 0.04, near a singular pose lower."""
 
 HALVINGS = 6
@@ -67,7 +67,7 @@ class PowerBalance:
     worst_sample: int
     """index into the n samples of the largest |residual|"""
     differentiation: float
-    """how far dE/dt at two neighbouring steps differs, over peak_power: what `relative` cannot be expected to go below"""
+    """difference of dE/dt between two step sizes, over peak_power: below it, `relative` says nothing"""
 
 
 def power_balance(

@@ -1,0 +1,317 @@
+"""Forward replay: torques drive the MuJoCo model from the exact initial state, and it follows the motion or it does not.
+
+Right torques leave only the error of time stepping, which halves with the step. Wrong torques leave an error that
+stays, however small the step. So the replay judges torques with MuJoCo's *forward* dynamics and its own, soft loop
+closures, which share nothing with the projection. The model is always the one with distributed masses, as the file has
+it.
+
+Open-loop driving is unstable where gravity, a force or the motion itself pushes the mechanism away from its course;
+there any error, rounding included, grows exponentially and a long replay proves nothing. The window is therefore
+shortened until the reference's own torques, and the same a thousandth too large, keep the mechanism near its course at
+the coarsest step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from workbench.arrays import FloatArray
+from workbench.errors import ArrayError, MotionError
+from workbench.reference.mujoco_reference import MujocoReference
+
+COARSE_STEPS = 1000
+"""Steps over the window at the coarsest step size; the other two take twice and four times as many."""
+
+HALVINGS = (1, 2, 4)
+
+LONGEST_WINDOW = 1.0
+"""Seconds replayed at most, so that a case costs less than a second."""
+
+PROBES = (1.0, 1.001)
+"""The window is chosen with the reference's torques times these: as they are, and a thousandth too large. The second
+shows how much the motion amplifies an error; that of time stepping alone may cancel by chance."""
+
+NEAR = 0.1
+"""The window ends where a probe, at the coarsest step, is off by this fraction of a joint's stroke."""
+
+SHRINKINGS = 8
+"""How often the window may be shortened; a smaller window has smaller steps, so the search ends soon."""
+
+SMALLEST_STROKE = 1e-3
+"""m or rad: a joint that (almost) holds still is measured against this."""
+
+ORDER, ORDER_TOLERANCE = 1.0, 0.1
+"""Time stepping by `implicitfast` with torques held over a step is of first order."""
+
+STALLED = 0.5
+"""Torques are wrong when extrapolation to a step of zero leaves more than this fraction of the error at the finest."""
+
+LOST = 10.0
+"""Strokes; an error beyond is no tracking error any more."""
+
+LOOP_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+"""Near-rigid loop closures, with solref "2h 1" for step h; stiffer direct values diverge."""
+
+REFERENCE = "reference"
+"""Name of the reference's own torques among the replayed ones."""
+
+MotionAt = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+"""Times ``(n,)`` in s -> q, qd, qdd, each ``(n, na)``, SI."""
+
+TorqueAt = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+"""q, qd, qdd ``(n, na)`` -> tau ``(n, na)``: a closed form with its external force bound in."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """One candidate's replay at three step sizes."""
+
+    steps: FloatArray
+    """``(3,)`` step sizes, s, coarsest first"""
+    peak_error: FloatArray
+    """``(3, na)`` largest tracking error over the window per step size and joint, m or rad"""
+    final_error: FloatArray
+    """``(3, na)`` tracking error at the window's end; may pass through zero by chance, so no verdict rests on it"""
+    order: float
+    """observed order between the two finest steps, of the largest error in strokes; NaN where there is none"""
+    worst_joint: str
+    """the joint with the largest error in strokes at the finest step"""
+    limit: float
+    """peak error of that joint extrapolated to a step of zero, m or rad; never negative"""
+    verdict: str
+    """``converges``, ``stalls``, ``diverges`` or ``undecided``"""
+    text: str
+    """the verdict with its figures, for a table"""
+
+
+@dataclass(frozen=True)
+class ReplaySet:
+    """Replays of several candidates over the same window."""
+
+    start: float
+    stop: float
+    """the replayed window, s"""
+    asked_stop: float
+    limited_by: str
+    """why the window ends before *asked_stop*: ``duration``, ``instability`` or nothing"""
+    stroke: FloatArray
+    """``(na,)`` normaliser per joint: the range of q over what was asked for, m or rad"""
+    replays: dict[str, Replay]
+    """by candidate; `REFERENCE` is always among them"""
+
+    @property
+    def note(self) -> str:
+        """What a reader must know about the window."""
+        shown = f"replayed {self.start:.4g} to {self.stop:.4g} s"
+        if self.limited_by == "instability":
+            return f"{shown} of {self.start:.4g} to {self.asked_stop:.4g} s: driven open-loop, this motion is unstable"
+        if self.limited_by == "duration":
+            return f"{shown} of {self.start:.4g} to {self.asked_stop:.4g} s"
+        return shown
+
+
+def motion_through(t: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> MotionAt:
+    """Return the piecewise quintic that has the given position, velocity and acceleration at every sample.
+
+    Parameters
+    ----------
+    t
+        Times ``(n,)``, s, strictly increasing, n >= 2.
+    q, qd, qdd
+        Each ``(n, na)``, SI.
+
+    Raises
+    ------
+    ArrayError
+        Fewer than two samples or lengths that differ. The returned function raises MotionError outside of *t*.
+    """
+    from scipy.interpolate import BPoly
+
+    if not (len(t) == len(q) == len(qd) == len(qdd)) or len(t) < 2:
+        raise ArrayError(
+            f"t, q, qd, qdd: expected equal lengths of at least 2, got {[len(t), len(q), len(qd), len(qdd)]}"
+        )
+    position = BPoly.from_derivatives(t, np.stack([q, qd, qdd], axis=1))
+    velocity = position.derivative()
+    acceleration = velocity.derivative()
+    first, last = float(t[0]), float(t[-1])
+    slack = 1e-9 * (last - first)
+
+    def motion_at(times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        if times.min() < first - slack or times.max() > last + slack:
+            raise MotionError(
+                f"replay: {times.min():g} to {times.max():g} s asked for; allowed: {first:g} to {last:g} s"
+            )
+        inside = np.clip(times, first, last)
+        return position(inside), velocity(inside), acceleration(inside)
+
+    return motion_at
+
+
+def replay(
+    reference: MujocoReference,
+    motion_at: MotionAt,
+    torques: Mapping[str, TorqueAt],
+    start: float,
+    stop: float,
+    external_force: FloatArray | None = None,
+) -> ReplaySet:
+    """Drive the MuJoCo model with each candidate's torques, at three step sizes.
+
+    Torques are held over each step at their value in its middle; the loops are near-rigid springs of MuJoCo's solver.
+
+    Parameters
+    ----------
+    reference
+        The robot.
+    motion_at
+        The motion as a function of time; see `motion_through` for samples.
+    torques
+        Candidates by name; the reference's own torques are replayed beside them under the name `REFERENCE`.
+    start, stop
+        Window, s; at most `LONGEST_WINDOW` of it is replayed.
+    external_force
+        One constant vector ``(3,)`` in newtons, paper frame, on the platform (exact for platforms that do not turn).
+
+    Returns
+    -------
+    ReplaySet
+        A candidate that diverges or returns NaN gets a verdict, not an exception.
+
+    Raises
+    ------
+    MotionError
+        An empty window, or a motion that the reference cannot follow.
+    ArrayError
+        A candidate that returns another shape than ``(n, na)``.
+    """
+    if not stop > start:
+        raise MotionError(f"replay: stop = {stop:g} s; allowed: > start = {start:g} s", value=stop, limit=start)
+    force = np.zeros(3) if external_force is None else np.asarray(external_force, dtype=np.float64)
+    if force.shape != (3,):
+        raise ArrayError(f"external_force: a replay takes one constant vector of shape (3,), got {force.shape}")
+    runner = _Runner(reference, motion_at, start, force)
+    stroke = np.maximum(np.ptp(motion_at(np.linspace(start, stop, COARSE_STEPS))[0], axis=0), SMALLEST_STROKE)
+    window = min(stop - start, LONGEST_WINDOW)
+    limited_by = "duration" if window < stop - start else ""
+
+    def own(q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        return reference.inverse_dynamics(q, qd, qdd, "distributed", force).tau
+
+    for _ in range(SHRINKINGS):
+        tracked = runner.run({REFERENCE: own}, window, COARSE_STEPS, factors=PROBES)
+        away = ~np.all(np.abs(tracked) <= NEAR * stroke, axis=(0, 2))
+        if not away.any():
+            break
+        window *= max(int(np.argmax(away)), 1) / COARSE_STEPS
+        limited_by = "instability"
+    everyone = {REFERENCE: own, **torques}
+    errors = np.stack([runner.run(everyone, window, k * COARSE_STEPS, k) for k in HALVINGS], axis=1)
+    steps = window / COARSE_STEPS / np.array(HALVINGS)
+    replays = {name: _judge(errors[i], steps, stroke, reference.joint_names) for i, name in enumerate(everyone)}
+    return ReplaySet(start, start + window, stop, limited_by, stroke, replays)
+
+
+class _Runner:
+    """Runs torques on the model; all candidates of one step size as one batch."""
+
+    def __init__(self, reference: MujocoReference, motion_at: MotionAt, start: float, force: FloatArray) -> None:
+        self._reference, self._motion_at, self._start, self._force = reference, motion_at, start, force
+        self._initial = reference.inverse_dynamics(*motion_at(np.array([start])), "distributed", force)
+
+    def run(
+        self,
+        torques: Mapping[str, TorqueAt],
+        window: float,
+        steps: int,
+        every: int = 1,
+        factors: tuple[float, ...] = (1.0,),
+    ) -> FloatArray:
+        """Tracking errors ``(candidates * factors, steps / every, na)``: joint coordinates less those of the motion."""
+        structure = self._reference.structure
+        step = window / steps
+        model = near_rigid(self._reference.text, step)
+        middle = self._motion_at(self._start + step * (np.arange(steps) + 0.5))
+        applied = np.zeros((len(torques) * len(factors), steps, model.nv))
+        for i, (name, torque) in enumerate(torques.items()):
+            tau = np.asarray(torque(*middle), dtype=np.float64)
+            if tau.shape != middle[0].shape:
+                raise ArrayError(f'candidate "{name}": expected tau of shape {middle[0].shape}, got {tau.shape}')
+            for j, factor in enumerate(factors):
+                applied[i * len(factors) + j][:, structure.actuated] = factor * tau
+        lost = ~np.isfinite(applied).all(axis=(1, 2))
+        applied[lost] = 0.0
+        count = len(applied)
+        batch = Batch(model, count, 1)
+        batch.qpos = np.repeat(self._initial.qpos, count, axis=0)
+        batch.qvel = np.repeat(self._initial.qvel, count, axis=0)
+        batch.xfrc_applied = np.repeat(self._wrench(model)[None], count, axis=0)
+        record = batch.rollout(steps, applied, mujoco.mjtState.mjSTATE_QFRC_APPLIED.value, record=("qpos",))
+        followed = record["qpos"][:, every - 1 :: every, :][:, :, structure.actuated_qpos]
+        course = self._motion_at(self._start + step * np.arange(every, steps + 1, every))[0]
+        errors: FloatArray = followed - course
+        errors[lost] = np.nan
+        return errors
+
+    def _wrench(self, model: mujoco.MjModel) -> FloatArray:
+        """Force and its moment about the platform's mass centre, ``(nbody, 6)``, world frame, at the initial pose."""
+        site = self._reference.structure.platform_site
+        body = int(model.site_bodyid[site])
+        data = mujoco.MjData(model)
+        data.qpos[:] = self._initial.qpos[0]
+        mujoco.mj_kinematics(model, data)
+        wrench = np.zeros((model.nbody, 6))
+        wrench[body, :3] = self._reference.base_rotation @ self._force
+        wrench[body, 3:] = np.cross(data.site_xpos[site] - data.xipos[body], wrench[body, :3])
+        return wrench
+
+
+def near_rigid(text: str, step: float) -> mujoco.MjModel:
+    """Compile an MJCF for forward simulation at a step in seconds, its loops as stiff as the step allows."""
+    spec = mujoco.MjSpec.from_string(text)
+    option = spec.option
+    option.timestep = step
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    option.iterations = 100
+    option.tolerance = 1e-12
+    # torques are applied to the joints themselves, whatever the actuators' gears and limits are
+    flags = mujoco.mjtDisableBit
+    option.disableflags |= flags.mjDSBL_CONTACT.value | flags.mjDSBL_ACTUATION.value | flags.mjDSBL_AUTORESET.value
+    for equality in spec.equalities:
+        equality.solref = [2.0 * step, 1.0]
+        equality.solimp = list(LOOP_SOLIMP)
+    return spec.compile()
+
+
+def _judge(errors: FloatArray, steps: FloatArray, stroke: FloatArray, joints: tuple[str, ...]) -> Replay:
+    """Verdict on tracking errors ``(3, samples, na)``, NaN where the replay was lost."""
+    size = np.abs(errors)
+    peak, final = size.max(axis=1), size[:, -1]
+    relative = peak / stroke
+    worst = int(np.argmax(np.where(np.isnan(relative[-1]), np.inf, relative[-1])))
+    largest = relative.max(axis=1)
+    order, limit = math.nan, math.nan
+    if not np.isfinite(largest).all() or largest[-1] > LOST:
+        verdict = "diverges"
+        text = f"diverges: off by more than {LOST:g} strokes of {joints[worst]}, or not finite"
+    elif largest[-1] == 0.0:
+        verdict, text, limit = "converges", "converges: no error at any step", 0.0
+    else:
+        order = math.log2(largest[-2] / largest[-1]) if largest[-2] > 0.0 else -math.inf
+        limit = max(0.0, 2.0 * float(peak[-1, worst]) - float(peak[-2, worst]))
+        figures = ", ".join(f"{value:.2g}" for value in peak[:, worst])
+        if abs(order - ORDER) <= ORDER_TOLERANCE:
+            verdict, text = "converges", f"converges: order {order:.2f} ({joints[worst]}: {figures})"
+        elif limit > STALLED * peak[-1, worst]:
+            verdict, text = "stalls", f"stalls at {peak[-1, worst]:.2g} on {joints[worst]}"
+        else:
+            verdict, text = "undecided", f"undecided: order {order:.2f} ({joints[worst]}: {figures})"
+    return Replay(steps, peak, final, order, joints[worst], limit, verdict, text)
