@@ -463,7 +463,6 @@ def test_an_arm_in_line_with_its_rod_is_singular() -> None:
     assert 0 < abs(near["J_q22"][0]) < 0.05 < abs(mech.singularity_measures(q[:1])["J_q22"][0])
 
 
-@pytest.mark.xfail(strict=True, reason="only results that are not finite are looked at again; these are finite")
 def test_torques_at_a_singular_pose_are_refused() -> None:
     q2 = np.pi - np.arctan2(np.sqrt(0.24), 0.1)
     q, still = np.array([HOME, [0.0, q2, q2]]), np.zeros((2, 3))
@@ -471,7 +470,6 @@ def test_torques_at_a_singular_pose_are_refused() -> None:
         table_1().inverse_dynamics(q, still, still)
 
 
-@pytest.mark.xfail(strict=True, reason="the pose is one, so nothing is refused, and the product of rates overflows")
 def test_rates_so_large_that_torques_overflow_are_refused() -> None:
     q = np.array([HOME])
     with pytest.raises(MotionError, match="sample 0"):

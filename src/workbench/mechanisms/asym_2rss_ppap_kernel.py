@@ -23,7 +23,9 @@ from numba import njit
 from workbench.arrays import FloatArray
 from workbench.mechanisms.mass_models import MASS_MODELS, Bar, MassModel
 
-CONSTANTS = 21
+SINGULAR = 1e-6
+"""A pose counts as singular when a determinant, divided by the lengths it is made of, is below this: torques there are
+a million times the forces that cause them."""
 
 
 def pack(p: Any, model: MassModel = MASS_MODELS["distributed"]) -> FloatArray:
@@ -72,7 +74,8 @@ def pack(p: Any, model: MassModel = MASS_MODELS["distributed"]) -> FloatArray:
         p.a5**2,
         swing.distal + p.m6,
         p.g * (swing.weight_distal + p.m6),
-        0.0,
+        # a determinant of J_x below this is a singular pose
+        SINGULAR * p.a2_left * p.a2_right,
     )
     return np.array(constants, dtype=np.float64)
 
@@ -106,7 +109,7 @@ def _kinematics(c, q1, s2, c2, s3, c3, qd1, qd2, qd3, qdd1, qdd2, qdd3):  # type
     jq2 = u2 * tcy + u3 * tcz
     jq3 = w2 * tdy + w3 * tdz
     det = u2 * w3 - u3 * w2
-    inv = 1.0 / det
+    inv = 1.0 / det if abs(det) > c[20] else math.nan
     r2 = jq2 * qd2 - q1 * qd1
     r3 = jq3 * qd3 - q1 * qd1
     xd2 = (w3 * r2 - u3 * r3) * inv

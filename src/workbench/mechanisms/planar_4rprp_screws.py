@@ -168,7 +168,7 @@ def torques(
     mass_model: str = "distributed",
     moment_sign: float = 1.0,
 ) -> FloatArray:
-    """Driving forces tau ``(n, 3)`` in newtons by partial screws and virtual work; [GarciaMurillo2016] section 6, to eq. (32).
+    """Driving forces tau ``(n, 3)``, N, by partial screws and virtual work; [GarciaMurillo2016] section 6, to eq. (32).
 
     Parameters
     ----------
