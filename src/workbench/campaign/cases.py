@@ -137,7 +137,9 @@ def _mechanism(path: Path, overrides: Mapping[str, float]) -> Mechanism:
 def _check_candidates(campaign: Campaign, mechanism: Mechanism) -> None:
     for candidate in campaign.candidate:
         if candidate.name not in mechanism.candidates:
-            hint = did_you_mean(candidate.name, mechanism.candidates)
+            # forms that are wrong on purpose are not among those that a walk through the candidates shows
+            known = {*mechanism.candidates, *getattr(mechanism.candidates, "on_purpose", ())}
+            hint = did_you_mean(candidate.name, known)
             raise SpecError(f'{mechanism.name} has no candidate "{candidate.name}"{hint}')
         if candidate.reference not in mechanism.mass_models:
             hint = did_you_mean(candidate.reference, mechanism.mass_models)

@@ -18,13 +18,13 @@ from workbench.mechanisms.base import Candidate, Mechanism
 from workbench.mechanisms.mass_models import MASS_MODELS, MassModel, mass_model
 
 MISPRINT_NAMES = {
-    Misprint.JQ33_SIGN: "jq33-sign",
-    Misprint.K1_M2_QUARTER: "k1-m2-quarter",
-    Misprint.F2_JXQ33: "f2-jxq33",
-    Misprint.TWO_M5: "two-m5",
-    Misprint.BD_GRAVITY_MISSING: "bd-gravity-missing",
-    Misprint.PLATFORM_GRAVITY_MISSING: "platform-gravity-missing",
-    Misprint.BD_ROTATION_Q2: "bd-rotation-q2",
+    Misprint.JQ33_SIGN: "jq33",
+    Misprint.K1_M2_QUARTER: "k1",
+    Misprint.F2_JXQ33: "f2",
+    Misprint.TWO_M5: "m5",
+    Misprint.BD_GRAVITY_MISSING: "bd-weight",
+    Misprint.PLATFORM_GRAVITY_MISSING: "platform-weight",
+    Misprint.BD_ROTATION_Q2: "bd-q2",
 }
 """Each misprint as candidates' names spell it."""
 
@@ -60,7 +60,7 @@ def _of_mass_model(model: MassModel) -> Candidate:
     return Candidate(
         name=model.name,
         mass_model=model.name,
-        function=lambda mech, q, qd, qdd, force: mech.torques(q, qd, qdd, model.name, force),
+        function=lambda mech, q, qd, qdd, force: mech.torques(q, qd, qdd, model.name, force) + mech.friction(q, qd, qdd),
         description=f"virtual work in end-point coordinates, {model.description}",
         source=model.source or "docs/derivations/asym_2rss_ppap.md",
     )
@@ -86,7 +86,7 @@ def _literal(
             external_force=external_force,
             misprints=misprints,
         )
-        return result
+        return result + mech.friction(q, qd, qdd)
 
     return Candidate(name, mass_model, torques, description, source)
 
@@ -96,7 +96,7 @@ def _misprinted(
 ) -> list[Candidate]:
     """Return a form as printed, and for each of its misprints the form with that one alone mended and alone kept.
 
-    ``NAME-as-printed``, ``NAME-as-printed-but-MISPRINT-mended``, ``NAME-with-MISPRINT``.
+    ``NAME-as-printed``, ``NAME-as-printed-but-MISPRINT``, ``NAME-only-MISPRINT``.
     """
 
     def form(suffix: str, description: str, misprints: frozenset[Misprint]) -> Candidate:
@@ -106,11 +106,9 @@ def _misprinted(
     for misprint, spelt in MISPRINT_NAMES.items():
         if misprint in printed:
             forms.append(
-                form(
-                    f"as-printed-but-{spelt}-mended", f"as printed, but mended: {misprint.value}", printed - {misprint}
-                )
+                form(f"as-printed-but-{spelt}", f"as printed, but mended: {misprint.value}", printed - {misprint})
             )
-            forms.append(form(f"with-{spelt}", f"mended, but for {misprint.value}", frozenset({misprint})))
+            forms.append(form(f"only-{spelt}", f"mended, but for {misprint.value}", frozenset({misprint})))
     return forms
 
 
@@ -122,7 +120,7 @@ CANDIDATES = Candidates(
     holding=(
         *(_of_mass_model(MASS_MODELS[name]) for name in ("lumped", "distributed")),
         _literal("lumped-appendix", *_APPENDIX[:2], "K1 to K6 of the appendix, repaired", _APPENDIX[2]),
-        _literal("lumped-equation4", *_EQUATION_4[:2], "the sum of virtual works, repaired", _EQUATION_4[2]),
+        _literal("equation4", *_EQUATION_4[:2], "the sum of virtual works, repaired", _EQUATION_4[2]),
         _literal("distributed-rotation", *_ROTATION[:2], "rotation matrices and angular accelerations", _ROTATION[2]),
     ),
     on_purpose=(
