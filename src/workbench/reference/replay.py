@@ -1,4 +1,4 @@
-"""Forward replay: torques drive the MuJoCo model from the exact initial state, and it follows the motion or it does not.
+"""Forward replay: torques drive the MuJoCo model from the exact initial state; either it follows the motion or not.
 
 Right torques leave only the error of time stepping, which halves with the step. Wrong torques leave an error that
 stays, however small the step. So the replay judges torques with MuJoCo's *forward* dynamics and its own, soft loop
@@ -14,7 +14,8 @@ the coarsest step.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import mujoco
@@ -197,7 +198,8 @@ def replay(
     if force.shape != (3,):
         raise ArrayError(f"external_force: a replay takes one constant vector of shape (3,), got {force.shape}")
     runner = _Runner(reference, motion_at, start, force)
-    stroke = np.maximum(np.ptp(motion_at(np.linspace(start, stop, COARSE_STEPS))[0], axis=0), SMALLEST_STROKE)
+    course = motion_at(_times(start, (stop - start) / COARSE_STEPS, COARSE_STEPS))[0]
+    stroke = np.maximum(np.ptp(course, axis=0), SMALLEST_STROKE)
     window = min(stop - start, LONGEST_WINDOW)
     limited_by = "duration" if window < stop - start else ""
 
@@ -214,7 +216,8 @@ def replay(
     everyone = {REFERENCE: own, **torques}
     errors = np.stack([runner.run(everyone, window, k * COARSE_STEPS, k) for k in HALVINGS], axis=1)
     steps = window / COARSE_STEPS / np.array(HALVINGS)
-    replays = {name: _judge(errors[i], steps, stroke, reference.joint_names) for i, name in enumerate(everyone)}
+    labels = _labels(reference)
+    replays = {name: _judge(errors[i], steps, stroke, labels) for i, name in enumerate(everyone)}
     return ReplaySet(start, start + window, stop, limited_by, stroke, replays)
 
 
@@ -237,7 +240,7 @@ class _Runner:
         structure = self._reference.structure
         step = window / steps
         model = near_rigid(self._reference.text, step)
-        middle = self._motion_at(self._start + step * (np.arange(steps) + 0.5))
+        middle = self._motion_at(_times(self._start + 0.5 * step, step, steps))
         applied = np.zeros((len(torques) * len(factors), steps, model.nv))
         for i, (name, torque) in enumerate(torques.items()):
             tau = np.asarray(torque(*middle), dtype=np.float64)
@@ -252,9 +255,10 @@ class _Runner:
         batch.qpos = np.repeat(self._initial.qpos, count, axis=0)
         batch.qvel = np.repeat(self._initial.qvel, count, axis=0)
         batch.xfrc_applied = np.repeat(self._wrench(model)[None], count, axis=0)
-        record = batch.rollout(steps, applied, mujoco.mjtState.mjSTATE_QFRC_APPLIED.value, record=("qpos",))
+        with _quiet():
+            record = batch.rollout(steps, applied, mujoco.mjtState.mjSTATE_QFRC_APPLIED.value, record=("qpos",))
         followed = record["qpos"][:, every - 1 :: every, :][:, :, structure.actuated_qpos]
-        course = self._motion_at(self._start + step * np.arange(every, steps + 1, every))[0]
+        course = self._motion_at(_times(self._start + every * step, every * step, steps // every))[0]
         errors: FloatArray = followed - course
         errors[lost] = np.nan
         return errors
@@ -270,6 +274,22 @@ class _Runner:
         wrench[body, :3] = self._reference.base_rotation @ self._force
         wrench[body, 3:] = np.cross(data.site_xpos[site] - data.xipos[body], wrench[body, :3])
         return wrench
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep MuJoCo from writing "unstable" to the terminal and to MUJOCO_LOG.TXT: that is a verdict here."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _times(first: float, step: float, count: int) -> FloatArray:
+    times: FloatArray = first + step * np.arange(count, dtype=np.float64)
+    return times
 
 
 def near_rigid(text: str, step: float) -> mujoco.MjModel:
@@ -291,17 +311,27 @@ def near_rigid(text: str, step: float) -> mujoco.MjModel:
     return spec.compile()
 
 
-def _judge(errors: FloatArray, steps: FloatArray, stroke: FloatArray, joints: tuple[str, ...]) -> Replay:
+def _labels(reference: MujocoReference) -> tuple[tuple[str, str], ...]:
+    """Name and coordinate unit of each actuated joint."""
+    model, slide = reference.compiled(), mujoco.mjtJoint.mjJNT_SLIDE.value
+    kinds = np.asarray(model.jnt_type)[np.asarray(model.dof_jntid)[reference.structure.actuated]]
+    return tuple(
+        (name, "m" if kind == slide else "rad") for name, kind in zip(reference.joint_names, kinds, strict=True)
+    )
+
+
+def _judge(errors: FloatArray, steps: FloatArray, stroke: FloatArray, labels: tuple[tuple[str, str], ...]) -> Replay:
     """Verdict on tracking errors ``(3, samples, na)``, NaN where the replay was lost."""
     size = np.abs(errors)
     peak, final = size.max(axis=1), size[:, -1]
     relative = peak / stroke
     worst = int(np.argmax(np.where(np.isnan(relative[-1]), np.inf, relative[-1])))
     largest = relative.max(axis=1)
+    joint, unit = labels[worst]
     order, limit = math.nan, math.nan
     if not np.isfinite(largest).all() or largest[-1] > LOST:
         verdict = "diverges"
-        text = f"diverges: off by more than {LOST:g} strokes of {joints[worst]}, or not finite"
+        text = f"diverges: off by more than {LOST:g} strokes of {joint}, or not finite"
     elif largest[-1] == 0.0:
         verdict, text, limit = "converges", "converges: no error at any step", 0.0
     else:
@@ -309,9 +339,9 @@ def _judge(errors: FloatArray, steps: FloatArray, stroke: FloatArray, joints: tu
         limit = max(0.0, 2.0 * float(peak[-1, worst]) - float(peak[-2, worst]))
         figures = ", ".join(f"{value:.2g}" for value in peak[:, worst])
         if abs(order - ORDER) <= ORDER_TOLERANCE:
-            verdict, text = "converges", f"converges: order {order:.2f} ({joints[worst]}: {figures})"
+            verdict, text = "converges", f"converges: order {order:.2f} ({joint}: {figures} {unit})"
         elif limit > STALLED * peak[-1, worst]:
-            verdict, text = "stalls", f"stalls at {peak[-1, worst]:.2g} on {joints[worst]}"
+            verdict, text = "stalls", f"stalls at {peak[-1, worst]:.2g} {unit} on {joint}"
         else:
-            verdict, text = "undecided", f"undecided: order {order:.2f} ({joints[worst]}: {figures})"
-    return Replay(steps, peak, final, order, joints[worst], limit, verdict, text)
+            verdict, text = "undecided", f"undecided: order {order:.2f} ({joint}: {figures} {unit})"
+    return Replay(steps, peak, final, order, joint, limit, verdict, text)
