@@ -22,7 +22,7 @@ LOOP_KINDS = {"connect": mujoco.mjtEq.mjEQ_CONNECT.value, "weld": mujoco.mjtEq.m
 
 LEFT_OUT: tuple[tuple[str, str, str, str], ...] = (
     ("joint", "damping", "dof_damping", "no damping"),
-    ("joint", "damping", "dof_dampingpoly", "no damping"),
+    ("joint", "damping beyond its first number", "dof_dampingpoly", "no damping but the linear one"),
     ("joint", "armature", "dof_armature", "no rotor inertia"),
     ("joint", "frictionloss", "dof_frictionloss", "no dry friction"),
     ("joint", "stiffness", "jnt_stiffness", "no spring"),

@@ -36,6 +36,8 @@ FIELDS = {
     ("site", "pos"): (mujoco.mjtObj.mjOBJ_SITE, "site_pos"),
     ("joint", "pos"): (mujoco.mjtObj.mjOBJ_JOINT, "jnt_pos"),
     ("joint", "damping"): (mujoco.mjtObj.mjOBJ_JOINT, "dof_damping"),
+    ("joint", "frictionloss"): (mujoco.mjtObj.mjOBJ_JOINT, "dof_frictionloss"),
+    ("joint", "armature"): (mujoco.mjtObj.mjOBJ_JOINT, "dof_armature"),
 }
 """Where the compiled model keeps an attribute."""
 

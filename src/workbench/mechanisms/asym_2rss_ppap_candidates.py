@@ -57,10 +57,13 @@ class Candidates(Mapping[str, Candidate]):
 
 
 def _of_mass_model(model: MassModel) -> Candidate:
+    def torques(mech: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> FloatArray:
+        return mech.torques(q, qd, qdd, model.name, force) + mech.friction(q, qd, qdd)
+
     return Candidate(
         name=model.name,
         mass_model=model.name,
-        function=lambda mech, q, qd, qdd, force: mech.torques(q, qd, qdd, model.name, force) + mech.friction(q, qd, qdd),
+        function=torques,
         description=f"virtual work in end-point coordinates, {model.description}",
         source=model.source or "docs/derivations/asym_2rss_ppap.md",
     )

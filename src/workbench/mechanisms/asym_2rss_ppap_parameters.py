@@ -8,6 +8,13 @@ from typing import Any
 
 from workbench.errors import ParameterError
 from workbench.mechanisms.base import SIDES, ParameterInfo, Target, UniformRule
+from workbench.mechanisms.friction import (
+    HINGE_DAMPING,
+    SLIDE_DAMPING,
+    damping_parameter,
+    drive_parameters,
+    drive_targets,
+)
 from workbench.mechanisms.layout import BodyInfo, Layout, LoopInfo, X, Z
 
 TABLE_1 = "[Almeida2010] Table 1"
@@ -52,6 +59,19 @@ class Parameters:
     k2_left: float
     k2_right: float
     k5: float
+    damping_q1: float = 0.0
+    damping_q2: float = 0.0
+    damping_q3: float = 0.0
+    coulomb_q1: float = 0.0
+    coulomb_q2: float = 0.0
+    coulomb_q3: float = 0.0
+    armature_q1: float = 0.0
+    armature_q2: float = 0.0
+    armature_q3: float = 0.0
+    damping_parallelogram: float = 0.0
+    damping_slide: float = 0.0
+    damping_ball_left: float = 0.0
+    damping_ball_right: float = 0.0
 
     def __getattr__(self, name: str) -> Any:
         """Common value of a sided parameter.
@@ -111,6 +131,10 @@ PARAMETERS: tuple[ParameterInfo, ...] = (
     _fraction("k1", "mass centre of the arm, fraction of its length from A, B", sided=True),
     _fraction("k2", "mass centre of the rod, fraction of its length from C, D", sided=True),
     _fraction("k5", "mass centre of the parallelogram bars, fraction of their length from the slider"),
+    *drive_parameters(("q1", "q2", "q3"), ("m", "rad", "rad")),
+    damping_parameter("damping_parallelogram", HINGE_DAMPING, "in each of the parallelogram's three jointed hinges"),
+    damping_parameter("damping_slide", SLIDE_DAMPING, "of the platform in the coupler"),
+    damping_parameter("damping_ball", HINGE_DAMPING, "in the spherical joint between arm and rod, C or D", sided=True),
 )
 
 SIDED = frozenset(info.name for info in PARAMETERS if info.sided)
@@ -120,6 +144,7 @@ def _limb(side: str) -> list[Target]:
     """MJCF numbers of one limb; arms lie along -y (left) or +y (right) of their own frame, rods along +z."""
     out = -1.0 if side == "left" else 1.0
     arm, rod, platform_joint = f"arm_{side}", f"rod_{side}", "E" if side == "left" else "F"
+    ball = "spherical_C" if side == "left" else "spherical_D"
 
     def p(name: str) -> str:
         return f"{name}_{side}"
@@ -142,6 +167,7 @@ def _limb(side: str) -> list[Target]:
         Target("inertial", rod, "diaginertia", 0, 1.0, (p("I2"),), reads=p("I2")),
         Target("inertial", rod, "diaginertia", 1, 1.0, (p("I2"),)),
         Target("inertial", rod, "pos", 2, 1.0, (p("k2"), p("a2")), reads=p("k2")),
+        Target("joint", ball, "damping", 0, 1.0, (p("damping_ball"),), reads=p("damping_ball")),
     ]
 
 
@@ -181,6 +207,11 @@ TARGETS: tuple[Target, ...] = (
     Target("inertial", "slider", "mass", 0, 1.0, ("m4",), reads="m4"),
     Target("inertial", "coupler", "mass", 0, 1.0, ("m6",), reads="m6"),
     Target("inertial", "payload", "mass", 0, 1.0, ("payload",), reads="payload"),
+    *drive_targets(("q1", "q2", "q3")),
+    Target("joint", "parallelogram_hinge_1", "damping", 0, 1.0, ("damping_parallelogram",), "damping_parallelogram"),
+    Target("joint", "parallelogram_hinge_2", "damping", 0, 1.0, ("damping_parallelogram",)),
+    Target("joint", "coupler_hinge", "damping", 0, 1.0, ("damping_parallelogram",)),
+    Target("joint", "platform_slide", "damping", 0, 1.0, ("damping_slide",), reads="damping_slide"),
     Target("option", "", "gravity", 2, -1.0, ("g",), reads="g"),
 )
 

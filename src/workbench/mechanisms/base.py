@@ -219,10 +219,10 @@ class Mechanism(ABC):
 
         Parameters
         ----------
-        t, q
-            Times ``(n,)`` in seconds and actuated coordinates ``(n, na)``.
+        t, q, qd
+            Times ``(n,)`` in seconds, actuated coordinates and, where friction matters, their rates ``(n, na)``.
         """
-        found = []
+        found = [] if qd is None else self.friction_warnings(qd)
         for name, values in self.singularity_measures(q).items():
             worst = int(np.argmin(np.abs(values)))
             if abs(values[worst]) < NEAR_SINGULAR:
@@ -243,7 +243,7 @@ class Mechanism(ABC):
     def torques(
         self, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, external_force: FloatArray
     ) -> FloatArray:
-        """Inverse dynamics on checked arrays; called by `inverse_dynamics`."""
+        """Inverse dynamics without friction on checked arrays; see `inverse_dynamics`."""
 
     def inverse_dynamics(
         self,
@@ -261,6 +261,14 @@ class Mechanism(ABC):
             Actuated position, velocity, acceleration, each ``(n, 3)``, SI.
         mass_model
             One of `mass_models`: bars with their rotational inertia, or without.
+    def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        """What the actuators must supply for friction and rotor inertia, ``(n, na)``; `torques` leaves it out."""
+        return np.zeros_like(q)
+
+    def friction_warnings(self, qd: FloatArray) -> list[str]:
+        """Say where dry friction is a convention: samples ``(n, na)`` of *qd* at rest."""
+        return []
+
         external_force
             Newtons, paper frame, acting on the platform: ``(3,)`` or ``(n, 3)``; None is no force.
 
@@ -280,8 +288,9 @@ class Mechanism(ABC):
         """
         if mass_model not in self.mass_models:
             raise ParameterError(f'unknown mass model "{mass_model}"{did_you_mean(mass_model, self.mass_models)}')
-        arrays = as_batches(q=q, qd=qd, qdd=qdd)
-        return self.torques(*arrays, mass_model, as_force("external_force", external_force, len(arrays[0])))
+        q, qd, qdd = as_batches(q=q, qd=qd, qdd=qdd)
+        force = as_force("external_force", external_force, len(q))
+        return self.torques(q, qd, qdd, mass_model, force) + self.friction(q, qd, qdd)
 
 
 def stored_names(table: tuple[ParameterInfo, ...]) -> dict[str, ParameterInfo]:

@@ -16,8 +16,9 @@ from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.errors import MotionError
 from workbench.mechanisms import planar_4rprp_kernel as kernel
 from workbench.mechanisms import planar_4rprp_screws as screw_route
-from workbench.mechanisms.base import Candidate, Condition, Mechanism, ParameterInfo, Target, UniformRule
+from workbench.mechanisms.base import Candidate, Condition, Mechanism, ParameterInfo, Reach, Target, UniformRule
 from workbench.mechanisms.layout import Layout
+from workbench.mechanisms.planar_4rprp_friction import Friction
 from workbench.mechanisms.planar_4rprp_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
 
 SINGULAR = 1e-6
@@ -48,6 +49,7 @@ class Planar4Rprp(Mechanism):
         """Build from `Parameters`; see `Mechanism`."""
         super().__init__(parameters)
         self._constants = {model: kernel.pack(parameters, factor) for model, factor in BAR_INERTIA.items()}
+        self._friction = Friction(parameters)
 
     def forward_kinematics(self, q: ArrayLike) -> FloatArray:
         """Position of P on the home branch, Px > 0 and Py > 0; [GarciaMurillo2016] eq. (14)-(16).
@@ -251,6 +253,17 @@ class Planar4Rprp(Mechanism):
     def _passive_length(self, x: FloatArray) -> FloatArray:
         result: FloatArray = np.hypot(self._parameters.a - x[:, 0], x[:, 1] - self._parameters.h)
         return result
+    def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        """What the actuators must supply for friction and rotors; see `Mechanism.friction` and docs/friction.md."""
+        if not self._friction:
+            return np.zeros_like(q)
+        x, xd, _ = self.platform_motion(q, qd, qdd)
+        return self._friction.torques(qd, qdd, x, xd, self.jacobian(q))
+
+    def friction_warnings(self, qd: FloatArray) -> list[str]:
+        """Samples at which a joint with Coulomb friction rests; see `Mechanism.friction_warnings`."""
+        return self._friction.drives.warnings(qd)
+
 
     def _measures(self, q: FloatArray, x: FloatArray) -> dict[str, FloatArray]:
         determinant = self._parameters.b * x[:, 0] * x[:, 1] / np.prod(q, axis=1)
@@ -306,7 +319,8 @@ def _screw_candidate(name: str, description: str, moment_sign: float) -> Candida
         mech: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray
     ) -> FloatArray:
         x = mech.forward_kinematics(q)
-        return screw_route.torques(mech.parameters, q, qd, qdd, x, external_force, moment_sign=moment_sign)
+        tau = screw_route.torques(mech.parameters, q, qd, qdd, x, external_force, moment_sign=moment_sign)
+        return tau + mech.friction(q, qd, qdd)
 
     return Candidate(name, "distributed", torques, description, "[GarciaMurillo2016] eq. (17)-(32)")
 

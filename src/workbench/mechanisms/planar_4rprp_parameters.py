@@ -6,6 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from workbench.mechanisms.base import ParameterInfo, Target, UniformRule
+from workbench.mechanisms.friction import (
+    HINGE_DAMPING,
+    SLIDE_DAMPING,
+    damping_parameter,
+    drive_parameters,
+    drive_targets,
+)
 from workbench.mechanisms.layout import BodyInfo, Layout, LoopInfo, X, Y, Z
 
 TABLE_3 = "[GarciaMurillo2016] Table 3"
@@ -34,6 +41,19 @@ class Parameters:
     I2z: float
     I3x: float
     I3z: float
+    damping_q1: float = 0.0
+    damping_q2: float = 0.0
+    damping_q3: float = 0.0
+    coulomb_q1: float = 0.0
+    coulomb_q2: float = 0.0
+    coulomb_q3: float = 0.0
+    armature_q1: float = 0.0
+    armature_q2: float = 0.0
+    armature_q3: float = 0.0
+    damping_A: float = 0.0
+    damping_B: float = 0.0
+    damping_q4: float = 0.0
+    damping_slide: float = 0.0
 
 
 def _length(name: str, meaning: str) -> ParameterInfo:
@@ -63,6 +83,11 @@ PARAMETERS: tuple[ParameterInfo, ...] = (
     _inertia("I2z", "inertia of a cylinder about its mass centre, limbs turning about z (2, 4)"),
     _inertia("I3x", "inertia of a piston about its mass centre, limbs turning about x (1, 3)"),
     _inertia("I3z", "inertia of a piston about its mass centre, limbs turning about z (2, 4)"),
+    *drive_parameters(("q1", "q2", "q3"), ("m", "m", "m")),
+    damping_parameter("damping_A", HINGE_DAMPING, "in each of the four hinges A_i on the frame"),
+    damping_parameter("damping_B", HINGE_DAMPING, "in each of the four hinges B_i between piston and rod"),
+    damping_parameter("damping_q4", SLIDE_DAMPING, "in the passive prismatic joint of limb 4"),
+    damping_parameter("damping_slide", SLIDE_DAMPING, "of each rod in the platform"),
 )
 
 
@@ -91,6 +116,8 @@ def _limb(number: int) -> list[Target]:
         Target("inertial", piston, "diaginertia", 0, 1.0, (inertia3,), reads=reads(inertia3, first_of_axis)),
         Target("inertial", piston, "diaginertia", 2, 1.0, (inertia3,)),
         Target("geom", f"{piston}_rod", "fromto", 4, -2.0, ("c3",)),
+        Target("joint", f"hinge_A{number}", "damping", 0, 1.0, ("damping_A",), reads=reads("damping_A", first)),
+        Target("joint", f"hinge_B{number}", "damping", 0, 1.0, ("damping_B",), reads=reads("damping_B", first)),
     ]
 
 
@@ -134,6 +161,10 @@ TARGETS: tuple[Target, ...] = (
     Target("geom", "frame_A3A4", "fromto", 2, 1.0, ("b",)),
     Target("geom", "frame_A3A4", "fromto", 3, 1.0, ("a",)),
     Target("geom", "frame_A4A1", "fromto", 0, 1.0, ("a",)),
+    *drive_targets(("q1", "q2", "q3")),
+    Target("joint", "q4", "damping", 0, 1.0, ("damping_q4",), reads="damping_q4"),
+    Target("joint", "slide_13", "damping", 0, 1.0, ("damping_slide",), reads="damping_slide"),
+    Target("joint", "slide_24", "damping", 0, 1.0, ("damping_slide",)),
     Target("option", "", "gravity", 2, -1.0, ("g",), reads="g"),
 )
 

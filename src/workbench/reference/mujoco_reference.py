@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batches, as_force
+from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf import custom_text, load_model
 from workbench.reference.closure import Assembly, LoopCloser, constraint_jacobian
@@ -205,6 +206,8 @@ class MujocoReference:
             tables[0], dynamics.cdof_dot, *tables[1:], qvel, qdd, dynamics.mass, *self._mass_layout, dynamics.bias,
             body, point, force, qacc, tau, multipliers, acceleration_residual,
         )  # fmt: skip
+        # in MuJoCo dry friction is a constraint, so neither bias nor passive forces hold it
+        tau += engine.model.dof_frictionloss[structure.actuated] * direction(qd)
         x, xd, xdd, reactions = joint_reactions(
             engine.model, structure, poses, dynamics, qvel, qacc, multipliers, force, self._base_rotation,
             self._base_position,

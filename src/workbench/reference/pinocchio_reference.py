@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batches, as_force
+from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf import custom_text, load_model
 from workbench.reference.pinocchio_loops import PinocchioLoops
@@ -147,7 +148,7 @@ class PinocchioReference:
             a = W @ qdd[s]
             a[loops.passive] += loops.solve(jacobian, -drift)[0]
             residuals[1, s] = np.abs(jacobian @ a + drift).max(initial=0.0)
-            generalized = pin.rnea(model, data, here, v, a) + damping * v + friction * np.sign(v)
+            generalized = pin.rnea(model, data, here, v, a) + damping * v + friction * direction(v)
             generalized -= force_rows.T @ (base.rotation @ applied[s])
             tau[s] = W.T @ generalized
             pin.forwardKinematics(loops.model, loops.data, here, v, a)

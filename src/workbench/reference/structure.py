@@ -184,6 +184,38 @@ def _idle_rods(model: mujoco.MjModel, blocks: list[tuple[int, int, int, int, int
     return rods
 
 
+def _refuse_uncovered_friction(model: mujoco.MjModel, file: str) -> None:
+    """Refuse dry friction of passive joints, damping that is not linear, and friction that MuJoCo is told to ignore."""
+    driven = {int(joint) for joint in model.actuator_trnid[:, 0]}
+    for dof in range(model.nv):
+        joint, dry = int(model.dof_jntid[dof]), float(model.dof_frictionloss[dof])
+        name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+        if dry and joint not in driven:
+            raise ModelError(
+                f'{file}: joint "{name}" is passive and has frictionloss {dry:g}; dry friction is covered at actuated'
+                " joints only",
+                file=file,
+                joint=name,
+            )
+        if model.dof_dampingpoly[dof].any():
+            raise ModelError(
+                f'{file}: joint "{name}" has damping {model.dof_damping[dof]:g} and further terms'
+                f" {model.dof_dampingpoly[dof].tolist()}; damping is covered where it is one number",
+                file=file,
+                joint=name,
+            )
+    for flag, values in (("damper", model.dof_damping), ("frictionloss", model.dof_frictionloss)):
+        off = model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}").value
+        if off and values.any():
+            joint = int(model.dof_jntid[int(np.argmax(values != 0))])
+            name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+            raise ModelError(
+                f'{file}: <flag {flag}> is disabled, yet joint "{name}" has such friction; enable it or set it to zero',
+                file=file,
+                joint=name,
+            )
+
+
 def _refuse_uncovered(model: mujoco.MjModel, file: str) -> None:
     """Refuse what the closed-chain inverse dynamics leaves out, so that no error is ever silent."""
     obj = mujoco.mjtObj
@@ -211,6 +243,7 @@ def _refuse_uncovered(model: mujoco.MjModel, file: str) -> None:
         if model.jnt_stiffness[joint]:
             value = float(model.jnt_stiffness[joint])
             raise ModelError(f'{file}: joint "{name}" has stiffness {value:g}; springs are not covered', file=file)
+    _refuse_uncovered_friction(model, file)
     for actuator in range(model.nu):
         name = _name(model, obj.mjOBJ_ACTUATOR, actuator)
         if mujoco.mjtTrn(model.actuator_trntype[actuator]) != mujoco.mjtTrn.mjTRN_JOINT:
