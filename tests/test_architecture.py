@@ -19,9 +19,9 @@ PACKAGE = "workbench"
 MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("cli",),
+    ("cli", "console"),
     ("report",),
-    ("campaign",),
+    ("campaign", "workspace"),
     ("reference",),
     ("mjcf",),
     ("mechanisms",),

@@ -19,6 +19,7 @@ from workbench.campaign.cost import cost_us
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.errors import WorkbenchError
 from workbench.mechanisms.base import stored_names
+from workbench.staging import check_output, staged
 
 
 @dataclass(frozen=True)
@@ -75,10 +76,10 @@ def run_campaign(
     started, clock = datetime.now(UTC), time.perf_counter()
     campaign, file = load_campaign(path)
     directory = out or Path("reports") / campaign.name
-    store.check_output(directory)
+    check_output(directory, store.RUN)
     cases = resolve_cases(campaign, file, model, tuple(only), settings)
     results: list[CaseResult] = []
-    with store.staged(directory) as stage:
+    with staged(directory) as stage:
         for number, case in enumerate(cases):
             if progress:
                 progress(case.name, number, len(cases))
