@@ -16,7 +16,7 @@ from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.errors import MotionError
 from workbench.mechanisms import planar_4rprp_kernel as kernel
 from workbench.mechanisms import planar_4rprp_screws as screw_route
-from workbench.mechanisms.base import Candidate, Condition, Mechanism, ParameterInfo, Reach, Target, UniformRule
+from workbench.mechanisms.base import Candidate, Condition, Mechanism, ParameterInfo, Target, UniformRule
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.planar_4rprp_friction import Friction
 from workbench.mechanisms.planar_4rprp_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
