@@ -13,7 +13,9 @@ from typing import Annotated, NoReturn
 import typer
 
 from workbench._version import __version__
-from workbench.errors import ParameterError, WorkbenchError
+from workbench.commands.assignments import settings
+from workbench.commands.workspace import workspace
+from workbench.errors import WorkbenchError
 
 app = typer.Typer(
     name="workbench",
@@ -70,7 +72,10 @@ def run(
         Path | None, typer.Option(metavar="FILE", help="MJCF file in place of the campaign's own.")
     ] = None,
 ) -> None:
-    """Run a campaign: closed forms against MuJoCo, with a table of errors, a verdict and a report."""
+    """Run a campaign: closed forms against MuJoCo, with a table of errors, a verdict and a report.
+
+    Exit code 0: every bound holds; 1: a bound fails; 2: bad input, and nothing was written.
+    """
     from workbench.campaign.run import run_campaign
     from workbench.console import CaseProgress, print_outcome
     from workbench.report import build_report
@@ -81,7 +86,7 @@ def run(
             out,
             model=model,
             only=only or (),
-            settings=_settings(set_ or []),
+            settings=settings(set_ or []),
             command=["workbench", *sys.argv[1:]],
             progress=progress,
             report=build_report,
@@ -91,27 +96,7 @@ def run(
         raise typer.Exit(BOUND_FAILED)
 
 
-def _settings(assignments: list[str]) -> dict[str, float]:
-    """Read ``NAME=VALUE`` options.
-
-    Raises
-    ------
-    ParameterError
-        No ``=``, or a value that is not a number.
-    """
-    settings: dict[str, float] = {}
-    for assignment in assignments:
-        name, equals, text = (part.strip() for part in assignment.partition("="))
-        try:
-            value = float(text)
-        except ValueError:
-            equals = ""
-        if not name or not equals:
-            raise ParameterError(f'--set "{assignment}": expected NAME=VALUE with a number in SI units')
-        if name in settings:
-            raise ParameterError(f"--set {name} is given twice")
-        settings[name] = value
-    return settings
+app.command()(workspace)
 
 
 def main() -> NoReturn:
