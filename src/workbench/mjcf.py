@@ -48,6 +48,8 @@ FINITE = (
 )  # fmt: skip
 """Compiled arrays that every result depends on."""
 
+FINITE_OPTIONS = ("gravity", "wind", "density", "viscosity", "timestep")
+
 
 @dataclass(frozen=True)
 class LoadedModel:
@@ -114,8 +116,9 @@ def compile_text(text: str, file: str) -> mujoco.MjModel:
             model = mujoco.MjModel.from_xml_string(text)
     except (ValueError, TypeError, MemoryError, mujoco.FatalError) as error:
         raise ModelError(f"{file}: MuJoCo does not compile it: {error}", file=file) from error
-    for name in FINITE:
-        values = getattr(model, name)
+    numbers = [(name, getattr(model, name)) for name in FINITE]
+    numbers += [(f"option {name}", np.atleast_1d(getattr(model.opt, name))) for name in FINITE_OPTIONS]
+    for name, values in numbers:
         if values.size and not np.abs(values).max() <= LARGEST_NUMBER:
             raise ModelError(
                 f"{file}: {name} of the compiled model holds {np.abs(values).max():g}; allowed: at most"
