@@ -16,9 +16,8 @@ from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.errors import MotionError, ParameterError
 from workbench.mechanisms import asym_2rss_ppap_kernel as kernel
 from workbench.mechanisms.asym_2rss_ppap_candidates import CANDIDATES
-from workbench.mechanisms.asym_2rss_ppap_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
 from workbench.mechanisms.asym_2rss_ppap_friction import Friction
-from workbench.mechanisms.asym_2rss_ppap_kernel import SINGULAR
+from workbench.mechanisms.asym_2rss_ppap_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
 from workbench.mechanisms.base import Mechanism, ParameterInfo, Target, UniformRule
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.mass_models import mass_model as mass_model_of
@@ -49,12 +48,12 @@ class Asym2rssPpap(Mechanism):
     def __init__(self, parameters: Any) -> None:
         """Build from `Parameters`; see `Mechanism`."""
         super().__init__(parameters)
+        self._friction = Friction(parameters)
         self._constants = {model: kernel.pack(parameters, mass_model_of(model)) for model in self.mass_models}
 
     def forward_kinematics(self, q: ArrayLike) -> FloatArray:
         """Platform position on the branch where the platform hangs (larger x3); [Almeida2010] eq. (1).
 
-        self._friction = Friction(parameters)
         Parameters
         ----------
         q
@@ -177,6 +176,17 @@ class Asym2rssPpap(Mechanism):
             self._motion(q, qd, qdd)  # names the sample and the joint
         return tau
 
+    def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        """What the actuators must supply for friction and rotors; see `Mechanism.friction` and docs/friction.md."""
+        if not self._friction:
+            return np.zeros_like(q)
+        x, xd, _, jacobian, _ = self._motion(q, qd, qdd)
+        return self._friction.torques(q, qd, qdd, x, xd, jacobian)
+
+    def friction_warnings(self, qd: FloatArray) -> list[str]:
+        """Samples at which a joint with Coulomb friction rests; see `Mechanism.friction_warnings`."""
+        return self._friction.drives.warnings(qd)
+
     def _motion(
         self, q: FloatArray, qd: FloatArray, qdd: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -219,14 +229,3 @@ class Asym2rssPpap(Mechanism):
 
 
 Asym2rssPpap.candidates = CANDIDATES
-    def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-        """What the actuators must supply for friction and rotors; see `Mechanism.friction` and docs/friction.md."""
-        if not self._friction:
-            return np.zeros_like(q)
-        x, xd, _, jacobian, _ = self._motion(q, qd, qdd)
-        return self._friction.torques(q, qd, qdd, x, xd, jacobian)
-
-    def friction_warnings(self, qd: FloatArray) -> list[str]:
-        """Samples at which a joint with Coulomb friction rests; see `Mechanism.friction_warnings`."""
-        return self._friction.drives.warnings(qd)
-

@@ -239,6 +239,14 @@ class Mechanism(ABC):
                 )
         return found
 
+    def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        """What the actuators must supply for friction and rotor inertia, ``(n, na)``; `torques` leaves it out."""
+        return np.zeros_like(q)
+
+    def friction_warnings(self, qd: FloatArray) -> list[str]:
+        """Say where dry friction is a convention: samples ``(n, na)`` of *qd* at rest."""
+        return []
+
     @abstractmethod
     def torques(
         self, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, external_force: FloatArray
@@ -261,14 +269,6 @@ class Mechanism(ABC):
             Actuated position, velocity, acceleration, each ``(n, 3)``, SI.
         mass_model
             One of `mass_models`: bars with their rotational inertia, or without.
-    def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-        """What the actuators must supply for friction and rotor inertia, ``(n, na)``; `torques` leaves it out."""
-        return np.zeros_like(q)
-
-    def friction_warnings(self, qd: FloatArray) -> list[str]:
-        """Say where dry friction is a convention: samples ``(n, na)`` of *qd* at rest."""
-        return []
-
         external_force
             Newtons, paper frame, acting on the platform: ``(3,)`` or ``(n, 3)``; None is no force.
 

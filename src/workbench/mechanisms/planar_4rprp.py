@@ -48,8 +48,8 @@ class Planar4Rprp(Mechanism):
     def __init__(self, parameters: Any) -> None:
         """Build from `Parameters`; see `Mechanism`."""
         super().__init__(parameters)
-        self._constants = {model: kernel.pack(parameters, factor) for model, factor in BAR_INERTIA.items()}
         self._friction = Friction(parameters)
+        self._constants = {model: kernel.pack(parameters, factor) for model, factor in BAR_INERTIA.items()}
 
     def forward_kinematics(self, q: ArrayLike) -> FloatArray:
         """Position of P on the home branch, Px > 0 and Py > 0; [GarciaMurillo2016] eq. (14)-(16).
@@ -230,6 +230,17 @@ class Planar4Rprp(Mechanism):
             self.platform_motion(q, qd, qdd)  # names the sample and the joint
         return tau
 
+    def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        """What the actuators must supply for friction and rotors; see `Mechanism.friction` and docs/friction.md."""
+        if not self._friction:
+            return np.zeros_like(q)
+        x, xd, _ = self.platform_motion(q, qd, qdd)
+        return self._friction.torques(qd, qdd, x, xd, self.jacobian(q))
+
+    def friction_warnings(self, qd: FloatArray) -> list[str]:
+        """Samples at which a joint with Coulomb friction rests; see `Mechanism.friction_warnings`."""
+        return self._friction.drives.warnings(qd)
+
     def _solve(self, q: FloatArray) -> FloatArray:
         x, unused_rate, unused_acceleration = (np.empty_like(q) for _ in range(3))
         zero = np.zeros_like(q)
@@ -253,17 +264,6 @@ class Planar4Rprp(Mechanism):
     def _passive_length(self, x: FloatArray) -> FloatArray:
         result: FloatArray = np.hypot(self._parameters.a - x[:, 0], x[:, 1] - self._parameters.h)
         return result
-    def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-        """What the actuators must supply for friction and rotors; see `Mechanism.friction` and docs/friction.md."""
-        if not self._friction:
-            return np.zeros_like(q)
-        x, xd, _ = self.platform_motion(q, qd, qdd)
-        return self._friction.torques(qd, qdd, x, xd, self.jacobian(q))
-
-    def friction_warnings(self, qd: FloatArray) -> list[str]:
-        """Samples at which a joint with Coulomb friction rests; see `Mechanism.friction_warnings`."""
-        return self._friction.drives.warnings(qd)
-
 
     def _measures(self, q: FloatArray, x: FloatArray) -> dict[str, FloatArray]:
         determinant = self._parameters.b * x[:, 0] * x[:, 1] / np.prod(q, axis=1)
