@@ -19,7 +19,7 @@ PACKAGE = "workbench"
 MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("cli", "console"),
+    ("cli", "commands", "console"),
     ("report",),
     ("campaign", "workspace"),
     ("reference",),

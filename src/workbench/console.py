@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -167,3 +168,18 @@ def _quantity(value: float, unit: str) -> str:
     if unit in ("", "1", "%"):
         return f"{100 * value:.2g} %" if unit == "%" else f"{value:.4g}"
     return f"{value:.4g} {unit}"
+
+
+def print_workspace(facts: dict[str, Any], directory: Path) -> None:
+    """Print volume, its error, extent and joint limits of a workspace, and where it lies."""
+    out.print(
+        Text(
+            f"Volume {facts['volume_m3']:.5f} m^3 +- {facts['volume_error_m3']:.5f} m^3 (half of the cells at the"
+            f" border), {facts['cells']} cells of {1000 * facts['spacing_m']:g} mm"
+        )
+    )
+    for axis, (low, high) in facts["extent_m"].items():
+        out.print(Text(f"  {axis}: {low:.3f} to {high:.3f} m"))
+    limits = ", ".join(f"{joint} {low:.4g} to {high:.4g}" for joint, (low, high) in facts["joint_limits"].items())
+    out.print(Text(f"Limits of the active joints (m, rad): {limits}"))
+    out.print(Text(f"Written to {directory}: workspace.parquet, workspace.json, figures"), soft_wrap=True)

@@ -7,26 +7,27 @@ errors.
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.errors import MotionError, ParameterError
 from workbench.mechanisms import asym_2rss_ppap_kernel as kernel
 from workbench.mechanisms.asym_2rss_ppap_candidates import CANDIDATES
 from workbench.mechanisms.asym_2rss_ppap_friction import Friction
+from workbench.mechanisms.asym_2rss_ppap_kernel import SINGULAR
 from workbench.mechanisms.asym_2rss_ppap_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
-from workbench.mechanisms.base import Mechanism, ParameterInfo, Target, UniformRule
+from workbench.mechanisms.base import Mechanism, ParameterInfo, Reach, Target, UniformRule
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.mass_models import mass_model as mass_model_of
 
-SINGULAR = 1e-6
-"""A pose counts as singular when a determinant, divided by the lengths it is made of, is below this: torques there are
-a million times the forces that cause them."""
-
 ELBOWS = ("out", "in")
+
+SAME_BRANCH = 1e-7
+"""Positions that differ by less than this fraction of the parallelogram's length are the same pose."""
 
 
 class Asym2rssPpap(Mechanism):
@@ -39,6 +40,12 @@ class Asym2rssPpap(Mechanism):
     coordinate_units: ClassVar[tuple[str, ...]] = ("m", "rad", "rad")
     force_units: ClassVar[tuple[str, ...]] = ("N", "N m", "N m")
     platform_axes: ClassVar[tuple[str, ...]] = ("x1", "x2", "x3")
+    up: ClassVar[tuple[float, float, float]] = (0.0, 0.0, -1.0)
+    joint_limits: ClassVar[tuple[tuple[float, float], ...]] = (
+        (-0.15, 0.15),
+        (-math.pi / 4, 0.75 * math.pi),
+        (-math.pi / 4, 0.75 * math.pi),
+    )
     parameter_table: ClassVar[tuple[ParameterInfo, ...]] = PARAMETERS
     targets: ClassVar[tuple[Target, ...]] = TARGETS
     uniform_rules: ClassVar[tuple[UniformRule, ...]] = UNIFORM_RULES
@@ -90,11 +97,53 @@ class Asym2rssPpap(Mechanism):
         ParameterError
             Unknown elbow branch.
         """
-        p = self._parameters
         points = as_batch("x", x)
         for elbow in elbows:
             if elbow not in ELBOWS:
                 raise ParameterError(f'unknown elbow branch "{elbow}"; valid: {", ".join(ELBOWS)}')
+        q, problems = self._arm_angles(points, elbows)
+        for bad, joint, what in problems:
+            self._refuse(bad, joint, what, points, "x")
+        return q
+
+    def reach(self, x: ArrayLike) -> Reach:
+        """Inverse kinematics, elbows out, that marks positions out of reach; see `Mechanism.reach`."""
+        points = as_batch("x", x)
+        q, problems = self._arm_angles(points, ("out", "out"))
+        n = len(points)
+        found, rate, acceleration, determinants = (np.full((n, 3), np.nan) for _ in range(4))
+        jacobian = np.full((n, 3, 3), np.nan)
+        zero = np.zeros_like(q)
+        kernel.motion_batch(
+            self._constants["distributed"], q, zero, zero, found, rate, acceleration, jacobian, determinants
+        )
+        # the platform hangs: a position on the other assembly branch has the same q and is not reached
+        reachable = np.abs(found - points).max(axis=1) < SAME_BRANCH * self._parameters.a5
+        reachable &= np.isfinite(jacobian).all(axis=(1, 2))
+        for bad, _, _ in problems:
+            reachable &= ~bad
+        q[~reachable] = np.nan
+        condition = np.full(n, np.nan)
+        p = self._parameters
+        scaled = jacobian[reachable] / [1.0, p.a1_left, p.a1_right]
+        with np.errstate(divide="ignore"):
+            condition[reachable] = np.linalg.cond(scaled)
+        measures = {name: np.where(reachable, value, np.nan) for name, value in self._scaled(determinants).items()}
+        return Reach(q, reachable, measures, condition)
+
+    def reach_box(self) -> tuple[FloatArray, FloatArray]:
+        """Box that holds the workspace; see `Mechanism.reach_box`."""
+        p = self._parameters
+        along = min(p.a2_left, p.a2_right)
+        across, depth = p.a5, min(p.a1_left + p.a2_left, p.a1_right + p.a2_right)
+        return np.array([-along, -across, -depth]), np.array([along, across, depth])
+
+    def _arm_angles(
+        self, points: FloatArray, elbows: tuple[str, str]
+    ) -> tuple[FloatArray, list[tuple[NDArray[np.bool_], str, str]]]:
+        """Actuated coordinates, and for each way to be out of reach the samples, the joint and the words for it."""
+        p = self._parameters
+        problems: list[tuple[NDArray[np.bool_], str, str]] = []
         x1, x2, x3 = points.T
         q = np.empty_like(points)
         q[:, 0] = x1
@@ -108,10 +157,10 @@ class Asym2rssPpap(Mechanism):
             with np.errstate(divide="ignore", invalid="ignore"):
                 cosine = (distance**2 + x1**2 + a1**2 - a2**2) / (2 * a1 * distance)
                 angle = np.arccos(cosine)
-            self._refuse(~np.isfinite(angle), joint, "position is out of reach of the limb", points, "x")
+            problems.append((~np.isfinite(angle), joint, "position is out of reach of the limb"))
             q[:, column] = np.arctan2(x3, outward) + (-angle if elbow == "out" else angle)
-        self._refuse(np.abs(x2) >= p.a5, "q1", f"|x2| reaches the parallelogram's length {p.a5:g} m", points, "x")
-        return q
+        problems.append((np.abs(x2) >= p.a5, "q1", f"|x2| reaches the parallelogram's length {p.a5:g} m"))
+        return q, problems
 
     def jacobian(self, q: ArrayLike) -> FloatArray:
         """J = J_x^-1 J_q, shape ``(n, 3, 3)``, with xd = J qd; [Almeida2010] eq. (2), with the sign of J_q33 mended."""
@@ -174,6 +223,8 @@ class Asym2rssPpap(Mechanism):
         kernel.torques_batch(self._constants[mass_model], q, qd, qdd, external_force, tau)
         if not np.isfinite(tau).all():
             self._motion(q, qd, qdd)  # names the sample and the joint
+            bad = ~np.isfinite(tau).all(axis=1)
+            self._refuse(bad, "q1, q2, q3", "rates so large that torques overflow", q, "q")
         return tau
 
     def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:

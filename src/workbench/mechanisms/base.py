@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.errors import ParameterError, did_you_mean
@@ -101,6 +101,20 @@ class Condition:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class Reach:
+    """Which platform positions a mechanism reaches on its home branch; entries of positions out of reach are NaN."""
+
+    q: FloatArray
+    """``(n, na)`` actuated coordinates, m or rad"""
+    reachable: NDArray[np.bool_]
+    """``(n,)``, joint limits not considered"""
+    measures: dict[str, FloatArray]
+    """the singularity measures, ``(n,)`` each"""
+    condition: FloatArray
+    """``(n,)`` condition number of the Jacobian, columns of turning actuators divided by their arm's length"""
+
+
 CandidateFunction = Callable[["Mechanism", FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 
 
@@ -132,6 +146,10 @@ class Mechanism(ABC):
     """unit of each q, ``m`` or ``rad``"""
     force_units: ClassVar[tuple[str, ...]]
     """unit of each tau, ``N`` or ``N m``"""
+    up: ClassVar[tuple[float, float, float]]
+    """unit vector against gravity, along one of the platform axes"""
+    joint_limits: ClassVar[tuple[tuple[float, float], ...]]
+    """range of each actuated coordinate that a workspace is computed for, where the user gives none"""
     platform_axes: ClassVar[tuple[str, ...]]
     """names of the platform coordinates as the paper writes them"""
     mass_models: ClassVar[tuple[str, ...]] = ("distributed", "lumped")
@@ -189,14 +207,20 @@ class Mechanism(ABC):
         """J of shape ``(n, 3, 3)`` with xd = J qd."""
 
     @abstractmethod
-    def platform_motion(
-        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def platform_motion(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Position, velocity and acceleration of the platform, each ``(n, 3)``."""
 
     @abstractmethod
     def joint_motion(self, x: ArrayLike, xd: ArrayLike, xdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Actuated position, velocity and acceleration, each ``(n, 3)``, from a platform motion."""
+
+    @abstractmethod
+    def reach(self, x: ArrayLike) -> Reach:
+        """Inverse kinematics that marks positions out of reach instead of refusing them; x ``(n, 3)`` in metres."""
+
+    @abstractmethod
+    def reach_box(self) -> tuple[FloatArray, FloatArray]:
+        """Corners ``(3,)``, metres, of a box in platform space that holds every position in reach."""
 
     @abstractmethod
     def singularity_measures(self, q: ArrayLike) -> dict[str, FloatArray]:
@@ -214,7 +238,7 @@ class Mechanism(ABC):
         """Conditions that the mechanism's source states against singular poses, over a motion ``(n, na)``."""
         return ()
 
-    def warnings(self, t: FloatArray, q: FloatArray) -> list[str]:
+    def warnings(self, t: FloatArray, q: FloatArray, qd: FloatArray | None = None) -> list[str]:
         """What a reader of a case's results should know: poses near a singularity, lengths that look like millimetres.
 
         Parameters
@@ -227,8 +251,8 @@ class Mechanism(ABC):
             worst = int(np.argmin(np.abs(values)))
             if abs(values[worst]) < NEAR_SINGULAR:
                 found.append(
-                    f"close to a singular pose at t = {t[worst]:.6g} s: |{name}| falls to {abs(values[worst]):.3g} of its"
-                    f" scale (warning below {NEAR_SINGULAR:g})"
+                    f"close to a singular pose at t = {t[worst]:.6g} s: |{name}| falls to {abs(values[worst]):.3g} of"
+                    f" its scale (warning below {NEAR_SINGULAR:g})"
                 )
         for name, info in stored_names(self.parameter_table).items():
             value = getattr(self._parameters, name)

@@ -16,7 +16,7 @@ from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.errors import MotionError
 from workbench.mechanisms import planar_4rprp_kernel as kernel
 from workbench.mechanisms import planar_4rprp_screws as screw_route
-from workbench.mechanisms.base import Candidate, Condition, Mechanism, ParameterInfo, Target, UniformRule
+from workbench.mechanisms.base import Candidate, Condition, Mechanism, ParameterInfo, Reach, Target, UniformRule
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.planar_4rprp_friction import Friction
 from workbench.mechanisms.planar_4rprp_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
@@ -39,6 +39,8 @@ class Planar4Rprp(Mechanism):
     coordinate_units: ClassVar[tuple[str, ...]] = ("m", "m", "m")
     force_units: ClassVar[tuple[str, ...]] = ("N", "N", "N")
     platform_axes: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    up: ClassVar[tuple[float, float, float]] = (0.0, 1.0, 0.0)
+    joint_limits: ClassVar[tuple[tuple[float, float], ...]] = ((0.2, 0.6), (0.2, 0.6), (0.2, 0.6))
     parameter_table: ClassVar[tuple[ParameterInfo, ...]] = PARAMETERS
     targets: ClassVar[tuple[Target, ...]] = TARGETS
     uniform_rules: ClassVar[tuple[UniformRule, ...]] = UNIFORM_RULES
@@ -113,6 +115,26 @@ class Planar4Rprp(Mechanism):
         short = np.hypot(p.a - px, py - p.h) < SINGULAR * p.a
         self._refuse(short, "q4", "singular pose: the passive limb 4 has no length", points, "x")
         return np.stack([np.hypot(py, pz), np.hypot(px, py - p.h), np.hypot(py, p.b - pz)], axis=1)
+
+    def reach(self, x: ArrayLike) -> Reach:
+        """Inverse kinematics on the home branch that marks positions out of reach; see `Mechanism.reach`."""
+        points = as_batch("x", x)
+        p = self._parameters
+        px, py, pz = points.T
+        reachable = (px > 0) & (py > 0) & (np.hypot(p.a - px, py - p.h) >= SINGULAR * p.a)
+        q = np.stack([np.hypot(py, pz), np.hypot(px, py - p.h), np.hypot(py, p.b - pz)], axis=1)
+        q[~reachable] = np.nan
+        condition = np.full(len(points), np.nan)
+        with np.errstate(divide="ignore"):
+            condition[reachable] = np.linalg.cond(self._rows(q[reachable], points[reachable]))
+        measures = {name: np.where(reachable, value, np.nan) for name, value in self._measures(q, points).items()}
+        return Reach(q, reachable, measures, condition)
+
+    def reach_box(self) -> tuple[FloatArray, FloatArray]:
+        """Box that holds every position with limbs no longer than `joint_limits` allow; see `Mechanism.reach_box`."""
+        longest = max(high for _, high in self.joint_limits)
+        p = self._parameters
+        return np.array([0.0, 0.0, p.b - longest]), np.array([longest, longest, longest])
 
     def passive_length(self, q: ArrayLike) -> FloatArray:
         """Length q4 of the passive limb, ``(n,)`` in metres."""
@@ -190,14 +212,14 @@ class Planar4Rprp(Mechanism):
 
     def mobility_count(self) -> dict[str, int]:
         """Gogu's count, [GarciaMurillo2016] eq. (1)-(8), each dimension from the rank of screws."""
-        from workbench.mechanisms.planar_4rprp_mobility import gogu_mobility  # noqa: PLC0415 - it imports this module
+        from workbench.mechanisms.planar_4rprp_mobility import gogu_mobility
 
         count = gogu_mobility(self._parameters)
         return {"joints p": count.p, "lost joint parameters r": count.r, "mobility M = p - r": count.mobility}
 
     def paper_conditions(self, q: ArrayLike) -> tuple[Condition, ...]:
         """Section 5's conditions on the limb lengths and Figure 7's, which are neither necessary nor sufficient."""
-        from workbench.mechanisms.planar_4rprp_singularity import paper_singularity_conditions  # noqa: PLC0415
+        from workbench.mechanisms.planar_4rprp_singularity import paper_singularity_conditions
 
         return tuple(
             Condition(
@@ -228,6 +250,8 @@ class Planar4Rprp(Mechanism):
         kernel.torques_batch(self._constants[mass_model], q, qd, qdd, external_force, tau)
         if not np.isfinite(tau).all():
             self.platform_motion(q, qd, qdd)  # names the sample and the joint
+            bad = ~np.isfinite(tau).all(axis=1)
+            self._refuse(bad, "q1, q2, q3", "rates so large that forces overflow", q, "q")
         return tau
 
     def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:

@@ -1,0 +1,1 @@
+"""Reachable workspaces: computed by discretisation, stored as a table of cells."""

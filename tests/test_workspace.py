@@ -1,0 +1,130 @@
+"""The workspace: against forward kinematics of random poses, its own error statement, and on the command line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import workbench as wb
+from workbench.cli import _run
+from workbench.errors import MotionError, ParameterError
+from workbench.mechanisms.base import Mechanism
+from workbench.workspace.grid import Workspace, compute_workspace
+
+MODELS = ("models/asym_2rss_ppap.xml", "models/planar_4rprp.xml")
+
+
+@pytest.fixture(params=MODELS, ids=["2RSS+PPaP", "4-RPRP"])
+def mechanism(request: pytest.FixtureRequest) -> Mechanism:
+    return wb.load_mechanism(request.param)
+
+
+def poses(mechanism: Mechanism, count: int) -> np.ndarray:
+    """Platform positions of random poses within the joint limits, by forward kinematics."""
+    rng = np.random.default_rng(5)
+    low, high = np.array(mechanism.joint_limits).T
+    found = []
+    while len(found) < count:
+        q = rng.uniform(low, high)[None, :]
+        try:
+            found.append(mechanism.forward_kinematics(q)[0])
+        except MotionError:
+            continue
+    return np.array(found)
+
+
+def share_inside(workspace: Workspace, points: np.ndarray, border: int) -> float:
+    """Share of points in a cell in reach, or within *border* cells of one."""
+    grid = np.pad(workspace.mask(), border + 1)
+    index = np.floor((points - workspace.low) / workspace.spacing).astype(int) + border + 1
+    shifts = np.stack(np.meshgrid(*[np.arange(-border, border + 1)] * 3), axis=-1).reshape(-1, 3)
+    return float(np.mean([any(grid[tuple(i + s)] for s in shifts) for i in index]))
+
+
+def test_every_pose_lies_in_it(mechanism: Mechanism) -> None:
+    points = poses(mechanism, 400)
+    if mechanism.name == "asym_2rss_ppap":
+        # arms that point inward reach the same positions with the other elbow; only elbows out are counted
+        q = mechanism.inverse_kinematics(points)
+        limits = np.array(mechanism.joint_limits)
+        hanging = mechanism.reach(points).reachable
+        points = points[hanging & np.all((q >= limits[:, 0]) & (q <= limits[:, 1]), axis=1)]
+    workspace = compute_workspace(mechanism, 0.02)
+    assert len(points) > 200
+    assert share_inside(workspace, points, border=1) == 1.0
+    # the twin: a workspace of a robot that reaches less far does not hold them
+    small = compute_workspace(mechanism, 0.02, {"q1": tuple(np.array(mechanism.joint_limits[0]) * 0.6)})
+    assert share_inside(small, points, border=0) < 0.9
+
+
+def test_cells_in_reach_are_reached(mechanism: Mechanism) -> None:
+    workspace = compute_workspace(mechanism, 0.03)
+    np.testing.assert_allclose(mechanism.forward_kinematics(workspace.q), workspace.x, atol=1e-9)
+    limits = np.array(workspace.limits)
+    assert np.all((workspace.q >= limits[:, 0]) & (workspace.q <= limits[:, 1]))
+
+
+@pytest.mark.parametrize("spacing", [0.04, 0.02, 0.013])
+def test_halving_the_grid_changes_the_volume_by_less_than_the_error_it_states(
+    mechanism: Mechanism, spacing: float
+) -> None:
+    coarse, fine = compute_workspace(mechanism, spacing), compute_workspace(mechanism, spacing / 2)
+    assert abs(coarse.volume - fine.volume) < coarse.volume_error
+    assert 0.4 * coarse.volume_error < fine.volume_error < 0.6 * coarse.volume_error
+    # the twin: a quarter of the volume would be noticed
+    assert abs(coarse.volume - 0.25 * fine.volume) > coarse.volume_error
+
+
+def test_a_box_by_hand() -> None:
+    """With x1 = q1 alone limited, the volume is proportional to q1's range while the rods do not limit it."""
+    mechanism = wb.load_mechanism(MODELS[0])
+    wide = compute_workspace(mechanism, 0.01, {"q1": (-0.02, 0.02)})
+    narrow = compute_workspace(mechanism, 0.01, {"q1": (-0.01, 0.01)})
+    assert narrow.volume == pytest.approx(wide.volume / 2, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"spacing": -1.0}, "spacing -1 m; allowed: > 0"),
+        ({"spacing": 1e-5}, "allowed: at most"),
+        ({"limits": {"q9": (0.0, 1.0)}}, 'no joint "q9"'),
+        ({"limits": {"q1": (1.0, 0.0)}}, "must be below"),
+        ({"limits": {"q1": (5.0, 6.0)}}, "no position in reach"),
+    ],
+)
+def test_bad_requests(arguments: dict, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        compute_workspace(wb.load_mechanism(MODELS[0]), **arguments)
+
+
+def test_the_command_writes_cells_facts_and_figures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "ws"
+    arguments = [
+        "workspace",
+        MODELS[0],
+        "--grid",
+        "0.04",
+        "--out",
+        str(out),
+        "--campaign",
+        "campaigns/almeida_2010.toml",
+    ]
+    assert _run(arguments) == 0
+    facts = json.loads((out / "workspace.json").read_text())
+    cells = pd.read_parquet(out / "workspace.parquet")
+    assert len(cells) == facts["cells"]
+    assert facts["volume_m3"] == pytest.approx(len(cells) * 0.04**3)
+    assert f"{facts['volume_m3']:.5f} m^3" in capsys.readouterr().out
+    assert {path.name for path in (out / "figures").iterdir()} == {
+        f"workspace_{view}.{suffix}" for view in ("sections", "space") for suffix in ("svg", "png")
+    }
+
+
+@pytest.mark.parametrize("option", ["q1", "q1=1", "q1=a:b", "=1:2", "q1=0:1 --limit q1=0:1"])
+def test_malformed_limits_are_one_line(option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert _run(["workspace", MODELS[0], "--out", str(tmp_path / "ws"), "--limit", *option.split(" ")]) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    assert not (tmp_path / "ws").exists()
