@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from small_campaign import CANDIDATES, CASE, CASES, HEAD, SMALL, Workbench, listing
 from workbench.campaign.spec import load_campaign
 from workbench.data_files import bundled
-from workbench.errors import SpecError
+from workbench.errors import ModelError, SpecError
 
 RULE = "allowed: letters, digits and _ . + -"
 
@@ -149,7 +150,7 @@ BAD_TEXTS = {
     "joint of a figure": (SMALL + changed('"q1"', '"q4"', FIGURE), 'figure "f": no joint "q4"'),
     "curve": (SMALL + changed("ref:lumped", "ref:lumpd", FIGURE), 'no curve "ref:lumpd"; did you mean "ref:lumped"?'),
     "curve not computed": (SMALL + changed("cand:lumped", "cand:lumped-appendix", FIGURE), 'no curve "cand:lumped-'),
-    "figure without curves": (SMALL + FIGURE.split("curves", maxsplit=1)[0], "a figure of kind torque needs joint and curves"),
+    "figure without curves": (SMALL + FIGURE.split("curves", maxsplit=1)[0], "kind torque needs joint and curves"),
     # empty and double
     "no case": (HEAD + CANDIDATES, "case: missing"),
     "empty case list": (HEAD + "case = []\n" + CANDIDATES, "case: list should have at least 1 item"),
@@ -272,9 +273,7 @@ def test_bad_model(what: str, workbench: Workbench) -> None:
 
 
 def test_loops_that_the_reference_cannot_close(workbench: Workbench, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The closed form refuses most such models first, so it is made blind here."""
-    monkeypatch.setattr("workbench.campaign.cases.Case.__post_init__", lambda case: None, raising=False)
-    from workbench.errors import ModelError
+    """The closed form refuses such robots first ("rod too short" above), so the reference only pretends here."""
 
     def no_loop(*_: object, **__: object) -> None:
         raise ModelError("m.xml: the loops cannot be closed from the home pose")
@@ -353,9 +352,7 @@ def test_motion_path(workbench: Workbench, name: str, expected: str) -> None:
 
 
 def test_singular_pose(workbench: Workbench) -> None:
-    """An arm in line with its rod: with x1 = 0 and a mirrored pose, b + a1 cos q = -a2 cos q ... at cos q = -b/(a1 + a2)."""
-    import math
-
+    """Both arms in line with their rods: (L - l) + (a1 + a2) cos q = 0."""
     angle = math.acos(-0.1 / 0.5)
     workbench.write(STRAIGHT.format(repr(angle)), "m.csv")
     line = refused(workbench, workbench.write(TABLE))

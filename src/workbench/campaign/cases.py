@@ -21,7 +21,7 @@ from workbench.campaign.spec import (
 )
 from workbench.data_files import bundled, bundled_names
 from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
-from workbench.mechanisms.base import Mechanism
+from workbench.mechanisms.base import SIDES, Mechanism
 from workbench.mjcf import load_model
 from workbench.motion import JointMotion, PlatformMotion, from_csv, multi_sine, pick_and_place, sine, time_grid
 
@@ -83,7 +83,7 @@ def resolve_cases(
         if only and spec.name not in only:
             continue
         try:
-            overrides = {**campaign.parameters, **spec.parameters, **(settings or {})}
+            overrides = layered(campaign.parameters, spec.parameters, settings or {})
             key = tuple(sorted(overrides.items()))
             if key not in loaded:
                 loaded[key] = _mechanism(path, overrides)
@@ -92,6 +92,17 @@ def resolve_cases(
         except WorkbenchError as error:
             raise _in_case(error, file, spec.name) from error
     return cases
+
+
+def layered(*layers: Mapping[str, float]) -> dict[str, float]:
+    """Merge parameters, later layers over earlier ones; ``m2`` of a later layer also goes over an earlier ``m2_left``."""
+    merged: dict[str, float] = {}
+    for layer in layers:
+        for name in layer:
+            for side in SIDES:
+                merged.pop(f"{name}_{side}", None)
+        merged |= layer
+    return merged
 
 
 def locate(campaign_file: Path, name: str, what: str) -> Path:
