@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -63,7 +64,7 @@ class Context:
         """The make-up that the closed form assumes."""
         return self.mechanism.layout
 
-    @property
+    @cached_property
     def covered(self) -> set[tuple[str, str, str]]:
         """Elements and attributes that parameters are read from: the numbers are checked with them."""
         return {(t.element, t.name, t.attribute) for t in self.mechanism.targets}
