@@ -266,8 +266,8 @@ class Asym2rssPpap(Mechanism):
         }
 
     @staticmethod
-    def _refuse(bad: np.ndarray[Any, np.dtype[np.bool_]], joint: str, what: str, values: FloatArray, name: str) -> None:
-        if bad.any():
+    def _refuse(bad: ArrayLike, joint: str, what: str, values: FloatArray, name: str) -> None:
+        if np.any(bad):
             sample = int(np.argmax(bad))
             shown = ", ".join(f"{value:.6g}" for value in values[sample])
             raise MotionError(
