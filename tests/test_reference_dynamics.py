@@ -79,12 +79,6 @@ def test_damping_and_armature_of_a_pendulum(tmp_path: Path) -> None:
     assert np.abs(added - 0.3 * qd - 0.02 * qdd).max() < EXACT * 100
 
 
-@pytest.mark.xfail(strict=True, reason="dry friction is neither covered nor refused where the model names no mechanism")
-def test_dry_friction_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match="friction"):
-        wb.MujocoReference(write_model(tmp_path, ROD.format('frictionloss="0.5"', TIP)))
-
-
 def test_no_sample_gives_no_result(tmp_path: Path) -> None:
     nothing = np.zeros((0, 1))
     reference = wb.MujocoReference(write_model(tmp_path, ROD.format("", TIP)))
