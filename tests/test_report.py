@@ -16,10 +16,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+
 from workbench.errors import OutputError
 from workbench.metrics import relative_error
 from workbench.report import build_report
+from workbench.report.load import load_run
 from workbench.report.text import error_fraction, escape_markdown, percent
+from workbench.report.verdict_section import verdict
 
 JOINTS = ("q1", "q2", "q3")
 UNITS = ("N", "N m", "N m")
@@ -29,14 +32,14 @@ CANDIDATES = {
     "distributed": "distributed",
     "distributed-rotation": "distributed",
 }
-PAIRS = [(name, model) for name, model in CANDIDATES.items()] + [("lumped", "distributed")]
+PAIRS = [*CANDIDATES.items(), ("lumped", "distributed")]
 BOUND = 1e-10
 NASTY = '<script>alert("1")</script> | *b* _i_ `c` [x](http://evil.example) $a$ \u4e2d\u6587 \U0001f916 \' & # '
 
+Edit = Callable[[dict[str, Any], list[dict[str, Any]]], None]
 
-def make_run(
-    folder: Path, cases: int = 2, samples: int = 120, edit: Callable[[dict[str, Any], list[dict[str, Any]]], None] | None = None
-) -> Path:
+
+def make_run(folder: Path, cases: int = 2, samples: int = 120, edit: Edit | None = None) -> Path:
     """Write a synthetic run directory: sinusoidal torques, round-off errors, and one case that ended in an error."""
     (folder / "series").mkdir(parents=True)
     random = np.random.default_rng(1)
@@ -109,6 +112,28 @@ def make_run(
             "acceleration_at_s": 2.5,
             "singularity": {"det J_x": {"min": 0.312, "time": 1.5}, "det J_q": {"min": 0.0451, "time": 2.5}},
             "kinematics": {"position": 1.1e-16, "velocity": 2.2e-16, "acceleration": 3.3e-15},
+            "peak_reactions": {"spherical_E": 9.2217, "hinge": 6.5822},
+            "conditions": [
+                {
+                    "name": "min q1 > b",
+                    "value": 0.7,
+                    "relation": ">",
+                    "limit": 0.6,
+                    "holds": True,
+                    "unit": "m",
+                    "note": "",
+                },
+                {
+                    "name": "max q3 < b",
+                    "value": 0.7,
+                    "relation": "<",
+                    "limit": 0.6,
+                    "holds": False,
+                    "unit": "m",
+                    "note": "",
+                },
+            ],
+            "solutions_at_start": [[0.1, 0.2, 0.3], [-0.1, 0.2, 0.3]],
             "warnings": ["det J_q falls to 0.045 at 2.5 s: close to the workspace boundary"] if number else [],
         }
     records["broken"] = {
@@ -119,22 +144,25 @@ def make_run(
     }
     curves = ["cand:lumped", "ref:lumped", "cand:distributed", "ref:distributed"]
     figures = [
-        {"id": "fig5", "title": "End effector position", "case": "sim1", "kind": "platform", "source": "[Paper2010] Fig. 5"},
+        {"id": "fig5", "title": "End effector", "case": "sim1", "kind": "platform", "source": "[Paper2010] Fig. 5"},
         *(
-            {"id": f"fig{n}", "title": f"Joint {j}", "case": "sim1", "kind": "torque", "joint": j, "curves": c, "source": ""}
+            {"id": f"fig{n}", "title": f"Joint {j}", "case": "sim1", "kind": "torque", "joint": j, "curves": c}
             for n, j, c in [(6, "q1", curves[:2]), (9, "q1", curves), (12, "q2", [curves[0], curves[2]])]
         ),
         {"id": "fig99", "title": "From a case with an error", "case": "broken", "kind": "platform", "source": ""},
         {"id": "fig98", "title": "From a case left out", "case": "absent", "kind": "platform", "source": ""},
+        {"id": "over", "title": "Errors over load", "kind": "error_over", "case": None, "cases": ["sim1", "sim2"],
+         "abscissa": [1.0, 2.0], "label": "load [kg]", "reference": "distributed", "curves": ["cand:lumped"]},
+        {"id": "fig96", "title": "Of a later version", "case": "sim1", "kind": "hologram"},
         {"id": "fig97", "title": "Unknown", "case": "sim1", "kind": "torque", "joint": "q1", "curves": ["cand:nobody"]},
-    ]
+    ]  # fmt: skip
     claims = [
-        {"id": "a", "text": "Errors below 0.1 %", "source": "[Paper2010] 4", "kind": "upper", "claimed": 0.1, "unit": "%",
-         "measured": 1.7e-13, "holds": True, "note": ""},
-        {"id": "b", "text": "Mass models differ by less", "source": "[Paper2010] 4", "kind": "upper", "claimed": 2.0, "unit": "%",
-         "measured": 3.0123, "holds": False, "note": "tau1"},
-        {"id": "c", "text": "Takes 703 us", "source": "[Paper2010] 4", "kind": "value", "claimed": 703, "unit": "us",
-         "measured": None, "holds": None, "note": "another machine"},
+        {"id": "a", "text": "Errors below 0.1 %", "source": "[Paper2010] 4", "kind": "upper", "claimed": 0.001,
+         "unit": "%", "measured": 1.7e-15, "holds": True, "note": ""},
+        {"id": "b", "text": "Mass models differ by less", "source": "[Paper2010] 4", "kind": "upper", "claimed": 0.02,
+         "unit": "%", "measured": 0.030123, "holds": False, "note": "tau1"},
+        {"id": "c", "text": "Takes 703 us", "source": "[Paper2010] 4", "kind": "value", "claimed": 703, "within": 5,
+         "unit": "us", "measured": None, "holds": None, "note": "another machine"},
     ]  # fmt: skip
     manifest: dict[str, Any] = {
         "format": 1,
@@ -166,7 +194,10 @@ def make_run(
         "finished": "2030-01-01T00:00:09Z",
         "seconds": 9.0,
         "status": "passed",
-        "candidates": {n: {"mass_model": m, "description": f"The {n} form.", "source": ""} for n, m in CANDIDATES.items()},
+        "candidates": {
+            n: {"mass_model": m, "description": f"The {n} form.", "source": "", "cost_us": 6.21}
+            for n, m in CANDIDATES.items()
+        },
         "claims": claims,
         "figures": figures,
         "cases": records,
@@ -266,7 +297,8 @@ def test_every_number_of_the_summary_stands_in_its_case_table(run: Path) -> None
     rows = summary(run)
     assert len(rows) == 30
     for row in rows:
-        shown = [r for r in tables[f"case-{row['case']}-{row['kind']}"] if r[:3] == [row["joint"], row["candidate"], row["reference"]]]
+        key = [row["joint"], row["candidate"], row["reference"]]
+        shown = [r for r in tables[f"case-{row['case']}-{row['kind']}"] if r[:3] == key]
         assert len(shown) == 1
         number = error_fraction if row["kind"] == "verification" else percent
         expected = [number(float(row[key])) for key in ("peak_error", "rms_error", "pointwise_error")]
@@ -282,17 +314,22 @@ def test_full_precision_stands_behind_the_rounded_numbers(run: Path) -> None:
         assert {row["peak_error"], row["rms_error"], row["pointwise_error"]} <= values
 
 
-@pytest.mark.parametrize("column", ["peak_error", "rms_error", "pointwise_error", "worst_time_s", "peak_reference"])
-def test_a_spoilt_number_shows(run: Path, tmp_path: Path, column: str) -> None:
+def test_a_spoilt_number_shows(run: Path, tmp_path: Path) -> None:
+    columns = ["peak_error", "rms_error", "pointwise_error", "worst_time_s", "peak_reference"]
+
     def spoil(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
-        rows[4][column] *= 1.5
+        for row, column in zip(rows, columns, strict=False):
+            row[column] *= 1.5
 
     spoilt = make_run(tmp_path / "run", edit=spoil)
     build_report(spoilt)
-    for name in ("report.html", "report.md"):
-        assert (spoilt / name).read_text(encoding="utf-8") != (run / name).read_text(encoding="utf-8")
-    key = f"case-sim1-{summary(spoilt)[4]['kind']}"
-    assert parse(spoilt).tables[key] != parse(run).tables[key]
+    before, after = (parse(folder).tables["case-sim1-verification"] for folder in (run, spoilt))
+    shown = {"peak_error": 3, "rms_error": 4, "pointwise_error": 5, "worst_time_s": 7, "peak_reference": 8}
+    for number, column in enumerate(columns, start=1):
+        changed = [k for k, (old, new) in enumerate(zip(before[number], after[number], strict=True)) if old != new]
+        assert changed == [shown[column]]
+    assert before[6:] == after[6:]
+    assert (spoilt / "report.md").read_bytes() != (run / "report.md").read_bytes()
 
 
 def test_worst_rows_come_first(tmp_path: Path) -> None:
@@ -311,10 +348,10 @@ def test_worst_rows_come_first(tmp_path: Path) -> None:
     assert "FAILED" in second[-1]
     assert "passed" in third[-1]
     modelling = tables["worst-modelling"]
-    assert modelling[0][3:] == ["q1 [N]", "q2 [N·m]", "q3 [N·m]"]
+    assert modelling[0][3:] == ["q1 [N]", "q2 [N·m]", "q3 [N·m]", "Verdict"]
     assert len(modelling) == 1 + 2
     text = (folder / "report.html").read_text(encoding="utf-8")
-    assert "2 of 24 verifications exceed their bound" in text
+    assert "2 of 24 checks exceed their bound" in text
 
 
 def test_verdicts_differ_in_words_and_style(tmp_path: Path) -> None:
@@ -322,16 +359,83 @@ def test_verdicts_differ_in_words_and_style(tmp_path: Path) -> None:
         without_error_case(manifest, rows)
         rows[0] |= {"peak_error": 1.02, "verdict": "fail"}  # and the manifest still says "passed"
 
-    seen = {}
-    for name, edit in {"error": None, "failed": fail, "passed": without_error_case}.items():
+    def disagree(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        without_error_case(manifest, rows)
+        manifest["cases"]["sim1"] |= {"status": "failed", "message": "platform velocity by 0.1 of its peak"}
+
+    edits = {"error": None, "failed": fail, "passed": without_error_case, "other": disagree}
+    seen = {name: verdict(load_run(make_run(tmp_path / name, edit=edit))) for name, edit in edits.items()}
+    keys = {name: status.key for name, (status, _) in seen.items()}
+    assert keys == {"error": "error", "failed": "failed", "passed": "passed", "other": "failed"}
+    assert len({(status.symbol, status.text) for status, _ in seen.values()}) == 3
+    assert seen["passed"][1].startswith("all 24 checks in 2 cases hold their bounds; worst is ")
+    assert seen["failed"][1].startswith(
+        "1 of 24 checks exceed their bound (worst is lumped on joint q1 in case sim1: 1.02e+00"
+    )
+    assert seen["other"][1] == "1 case failed for another reason (sim1)."
+    assert seen["error"][1].startswith("1 of 3 cases could not be computed (broken); the 24 checks that were made hold")
+
+
+def test_declared_failures_are_told_from_failures(tmp_path: Path) -> None:
+    def declare(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        without_error_case(manifest, rows)
+        for row in rows:
+            if row["candidate"] == "lumped-appendix":
+                row["kind"] = "expected-failure"
+                if row["joint"] == "q2":
+                    row |= {"peak_error": 1.0234, "verdict": "expected-fail"}
+
+    def miss(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        declare(manifest, rows)
+        next(row for row in rows if row["verdict"] == "expected-fail")["verdict"] = "unexpected-pass"
+
+    said = {}
+    for name, edit in {"declared": declare, "missed": miss}.items():
         folder = make_run(tmp_path / name, edit=edit)
         build_report(folder)
-        text = (folder / "report.html").read_text(encoding="utf-8")
-        seen[name] = re.search(r'<p class="verdict verdict-(\w+)">(.*)</p>', text)
-        assert seen[name][1] == name
-    assert "All 24 verifications in 2 cases hold their bounds" in seen["passed"][2]
-    assert "1.02e+00" in seen["failed"][2]
-    assert "1 of 3 cases could not be computed (broken)" in seen["error"][2]
+        tables = parse(folder).tables
+        assert len(tables["worst-expected-failure"]) == 1 + 2
+        assert tables["worst-expected-failure"][1][4] == "1.02e+00 (102 %)"
+        assert len(tables["case-sim1-expected-failure"]) == 1 + 3
+        said[name] = re.findall(
+            r'<p class="verdict verdict-(\w+)">.*</span> (.*)</p>', (folder / "report.html").read_text()
+        )
+    ((status, sentence),) = said["declared"]
+    assert status == "passed"
+    assert sentence.startswith("All 22 checks in 2 cases hold their bounds, and all 2 declared failures show")
+    assert said["missed"] == [("failed", "1 of 2 declared failures did not happen.")]
+
+
+def test_a_joint_with_another_normaliser_says_so(tmp_path: Path) -> None:
+    def edit(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        for row in rows:
+            row["normaliser"] = 0.125 if row["joint"] == "q1" and row["case"] == "sim1" else row["peak_reference"]
+
+    folder = make_run(tmp_path / "run", edit=edit)
+    build_report(folder)
+    tables = parse(folder).tables
+    assert tables["case-sim1-verification"][0][9] == "Normaliser"
+    assert tables["case-sim1-verification"][1][9] == "0.125 N"
+    assert "Normaliser" not in tables["case-sim2-verification"][0]
+
+
+def test_numbers_that_are_not_finite_are_words(tmp_path: Path) -> None:
+    def edit(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        # what the run stores as null because JSON has no word for it
+        manifest["cases"]["sim1"] |= {"condition": None, "kinematics": {"position": None}}
+        manifest["cases"]["sim1"]["singularity"]["det J_x"] = {"min": None, "time": None}
+        rows[0] |= {
+            "peak_error": float("inf"),
+            "rms_error": float("inf"),
+            "pointwise_error": float("inf"),
+            "verdict": "fail",
+        }
+
+    folder = make_run(tmp_path / "run", edit=edit)
+    build_report(folder)
+    tables = parse(folder).tables
+    assert tables["case-sim1-verification"][1][3:6] == ["infinite"] * 3
+    assert tables["case-sim1-singularity"][1] == ["det J_x", "–", "–"]
 
 
 def test_error_case_has_its_message_and_no_series(run: Path) -> None:
@@ -347,9 +451,9 @@ def test_error_case_has_its_message_and_no_series(run: Path) -> None:
 def test_claims_say_in_words_whether_they_hold(run: Path) -> None:
     rows = parse(run).tables["claims"][1:]
     assert [row[4].split(" ", 1)[1] for row in rows] == ["holds", "does not hold", "cannot be decided"]
-    assert rows[0][2:4] == ["at most 0.1 %", "1.7e-13 %"]
+    assert rows[0][2:4] == ["below 0.1 %", "1.7e-13 %"]
     assert rows[1][3] == "3.012 %"
-    assert rows[2][3] == "–"
+    assert rows[2][2:4] == ["703 us ± 5 us", "–"]
 
 
 def test_sections_stand_in_reading_order(run: Path) -> None:
@@ -362,11 +466,11 @@ def test_sections_stand_in_reading_order(run: Path) -> None:
 
 def test_campaign_figures_are_drawn_or_say_why_not(run: Path) -> None:
     names = {path.name for path in (run / "figures").iterdir()}
-    assert {f"figure-fig{n}.svg" for n in (5, 6, 9, 12)} <= names
-    assert not {f"figure-fig{n}.svg" for n in (97, 98, 99)} & names
+    assert {f"figure-fig{n}.svg" for n in (5, 6, 9, 12)} | {"figure-over.svg"} <= names
+    assert not {f"figure-fig{n}.svg" for n in (96, 97, 98, 99)} & names
     for name in ("report.html", "report.md"):
         text = (run / name).read_text(encoding="utf-8")
-        assert text.count("Not drawn: ") == 3
+        assert text.count("Not drawn: ") == 4
 
 
 def test_page_loads_nothing_and_its_links_lead_somewhere(run: Path) -> None:
@@ -390,7 +494,7 @@ def test_page_loads_nothing_and_its_links_lead_somewhere(run: Path) -> None:
 
 def test_figures_have_alternative_texts(run: Path) -> None:
     drawings = [attributes for tag, attributes in parse(run).tags if tag == "svg"]
-    assert len(drawings) == 2 * 6 + 4
+    assert len(drawings) == 2 * 6 + 5
     assert all(len(str(attributes["aria-label"])) > 30 for attributes in drawings)
     images = re.findall(r'<img src="([^"]*)" alt="([^"]*)"', (run / "report.md").read_text(encoding="utf-8"))
     assert len(images) == len(drawings)
@@ -431,6 +535,7 @@ def test_user_text_is_shown_as_text(tmp_path: Path) -> None:
     note = (folder / "report.md").read_text(encoding="utf-8")
     outside = re.sub(r"^(`{3,})text\n.*?\n\1$", "", note, flags=re.DOTALL | re.MULTILINE)
     assert "<script" not in outside
+    outside = re.sub(r'<img src="[^"]*" alt="[^"]*" width="[^"]*">', "", outside)
     assert not re.search(r"(?<!\\)\]\(http", outside)
     for path in (folder / "figures").iterdir():
         ElementTree.fromstring(path.read_text(encoding="utf-8"))

@@ -11,9 +11,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from workbench.errors import OutputError
-from workbench.report.figures import Plot
+from workbench.report.curves import Plot
 from workbench.report.load import Run, load_run
-from workbench.report.sections import Section, build_sections
+from workbench.report.section import Section
+from workbench.report.sections import build_sections
 from workbench.report.style import inline, report_style, standalone
 from workbench.report.text import fenced, finalize_markdown
 
@@ -69,12 +70,12 @@ def render_html(run: Run, sections: list[Section]) -> str:
     environment = _environment()
     environment.globals["inline_svg"] = _inline_svg
     bodies = [
-        (section, Markup(environment.get_template(f"{section.template}.html.j2").render(section.context)))  # noqa: S704
+        (section, Markup(environment.get_template(f"{section.template}.html.j2").render(section.context)))
         for section in sections
     ]
     style = environment.get_template("style.css").render()
     page = environment.get_template("report.html.j2")
-    text = page.render(manifest=run.manifest, sections=bodies, style=Markup(style))  # noqa: S704 - our own file
+    text = page.render(manifest=run.manifest, sections=bodies, style=Markup(style))
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip()) + "\n"
 
 
@@ -83,10 +84,10 @@ def render_markdown(run: Run, sections: list[Section]) -> str:
     environment = _environment()
     environment.finalize = finalize_markdown
     environment.filters["fenced"] = fenced
-    environment.filters["attribute"] = lambda text: Markup(escape(" ".join(str(text).split())))  # noqa: S704
+    environment.filters["attribute"] = lambda text: Markup(escape(" ".join(str(text).split())))
     environment.globals["figures"] = FIGURES
     bodies = [
-        (section, Markup(environment.get_template(f"{section.template}.md.j2").render(section.context)))  # noqa: S704
+        (section, Markup(environment.get_template(f"{section.template}.md.j2").render(section.context)))
         for section in sections
     ]
     text = environment.get_template("report.md.j2").render(manifest=run.manifest, sections=bodies)
@@ -104,7 +105,7 @@ def _environment() -> Environment:
 
 
 def _inline_svg(plot: Plot) -> Markup:
-    return Markup(inline(plot.svg, plot.alt))  # noqa: S704 - matplotlib escapes its texts, `inline` the alt text
+    return Markup(inline(plot.svg, plot.alt))
 
 
 def _write(path: Path, text: str) -> None:

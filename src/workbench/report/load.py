@@ -42,11 +42,8 @@ class ErrorRow:
     peak_reference: float
     unit: str
     pointwise_skipped: int
-
-    @property
-    def is_verification(self) -> bool:
-        """True for a formula against the reference with the same mass model."""
-        return self.kind == "verification"
+    normaliser: float
+    """what turns the largest difference into `peak_error`: the reference's peak, unless the run says otherwise"""
 
     @property
     def badness(self) -> float:
@@ -95,7 +92,8 @@ class Run:
 
     def _check_columns(self, path: Path, columns: Series) -> None:
         axes = [f"x{k + 1}" for k in range(len(self.manifest.platform_axes))]
-        needed = ["t", *self.manifest.joints, *axes, *(f"xd{axis[1:]}" for axis in axes)]
+        coordinates = [f"q{k + 1}" for k in range(len(self.manifest.joints))]
+        needed = ["t", *coordinates, *axes, *(f"{d}{axis[1:]}" for d in ("xd", "xdd") for axis in axes)]
         for name in needed:
             if name not in columns:
                 raise OutputError(f'{path}: column "{name}" is missing; needed: {", ".join(needed)}', column=name)
@@ -204,6 +202,7 @@ def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
         peak_reference=number("peak_reference"),
         unit=record["unit"],
         pointwise_skipped=int(number("pointwise_skipped")),
+        normaliser=number("normaliser" if record.get("normaliser") else "peak_reference"),
     )
 
 

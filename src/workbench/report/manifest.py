@@ -33,7 +33,7 @@ class ParameterRecord(Record):
     """One parameter of the mechanism, SI."""
 
     name: str
-    value: float
+    value: float | None = None
     unit: str = ""
     meaning: str = ""
     source: str = ""
@@ -45,6 +45,8 @@ class CandidateRecord(Record):
     mass_model: str
     description: str = ""
     source: str = ""
+    cost_us: float | None = None
+    """microseconds per sample, measured in the run"""
 
 
 class ClaimRecord(Record):
@@ -54,8 +56,12 @@ class ClaimRecord(Record):
     text: str
     source: str = ""
     kind: str = "value"
+    """``upper``: the claim is that the quantity stays below *claimed*"""
     claimed: float
+    within: float = 0.0
+    """how far from *claimed* a ``value`` may lie and still agree with print"""
     unit: str = ""
+    """``%`` says that the numbers are fractions and read best as percentages"""
     measured: float | None = None
     holds: bool | None = None
     note: str = ""
@@ -66,19 +72,38 @@ class FigureRecord(Record):
 
     id: str
     title: str
-    case: str
-    kind: Literal["platform", "platform_velocity", "platform_acceleration", "torque"]
+    kind: str
+    case: str | None = None
     joint: str | None = None
     curves: tuple[str, ...] = ()
     """``cand:NAME`` or ``ref:MASS_MODEL``"""
     source: str = ""
+    cases: tuple[str, ...] = ()
+    """for ``error_over``: the cases, in the order of *abscissa*"""
+    abscissa: tuple[float, ...] = ()
+    label: str = ""
+    """for ``error_over``: what the numbers of *abscissa* are, with their unit"""
+    reference: str | None = None
+    """for ``error_over``: the reference mass model that the errors are held against"""
 
 
 class SingularityRecord(Record):
     """The smallest value of a dimensionless determinant over a case, and when."""
 
-    min: float
+    min: float | None = None
     time: float | None = None
+
+
+class ConditionRecord(Record):
+    """A condition that a paper states against singular poses, evaluated over a case."""
+
+    name: str
+    value: float | None = None
+    relation: str = ""
+    limit: float | None = None
+    holds: bool | None = None
+    unit: str = ""
+    note: str = ""
 
 
 class CaseRecord(Record):
@@ -90,7 +115,7 @@ class CaseRecord(Record):
     message: str | None = None
     samples: int | None = None
     duration_s: float | None = None
-    parameters: dict[str, float] = {}
+    parameters: dict[str, float | None] = {}
     external_force: Any = None
     mobility: int | None = None
     rank: int | None = None
@@ -106,7 +131,10 @@ class CaseRecord(Record):
     speed_at_s: float | None = None
     acceleration_at_s: float | None = None
     singularity: dict[str, SingularityRecord] = {}
-    kinematics: dict[str, float] = {}
+    kinematics: dict[str, float | None] = {}
+    peak_reactions: dict[str, float | None] = {}
+    conditions: tuple[ConditionRecord, ...] = ()
+    solutions_at_start: tuple[tuple[float | None, ...], ...] = ()
     warnings: tuple[str, ...] = ()
 
 
@@ -124,6 +152,7 @@ class Manifest(Record):
     coordinate_units: tuple[str, ...]
     force_units: tuple[str, ...]
     platform_axes: tuple[str, ...] = ("x1", "x2", "x3")
+    mobility_count: dict[str, int] = {}
     parameters: tuple[ParameterRecord, ...] = ()
     versions: dict[str, str] = {}
     machine: dict[str, Any] = {}

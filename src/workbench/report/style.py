@@ -29,7 +29,7 @@ THEME = {
 }
 """Each drawn colour and the CSS variable that stands for it inside the page, so that figures follow dark and light."""
 
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "svg.fonttype": "none",  # text stays text: small, searchable, the same bytes on every machine
     "svg.hashsalt": "workbench",
     "path.simplify": True,
@@ -67,7 +67,9 @@ STYLE: dict[str, Any] = {
     "legend.fontsize": 8.0,
 }
 
-_DECLARATIONS = re.compile(r"^.*?(?=<svg)|<metadata>.*?</metadata>\s*|<defs>\s*<style.*?</style>\s*</defs>\s*", re.DOTALL)
+_DECLARATIONS = re.compile(
+    r"^.*?(?=<svg)|<metadata>.*?</metadata>\s*|<defs>\s*<style.*?</style>\s*</defs>\s*", re.DOTALL
+)
 _GEOMETRY = re.compile(r'(?<= )(?:d|x|y|transform)="[^"<>]*"')
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _FONT = re.compile(r"font-family: [^;\"]*")

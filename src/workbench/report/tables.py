@@ -24,8 +24,26 @@ HOLDS = Status("passed", "✓", "holds")
 REFUTED = Status("refuted", "✗", "does not hold")
 UNDECIDED = Status("undecided", "?", "cannot be decided")
 
+EXPECTED_FAIL = Status("expected", "≠", "declared failure, seen")
+UNEXPECTED_PASS = Status("failed", "✗", "DECLARED FAILURE, NOT SEEN", loud=True)
+PASSED_VERDICT = Status("passed", "✓", "PASSED", loud=True)
+ERROR_VERDICT = Status("error", "⚠", "ERROR", loud=True)
+UNDECIDED_VERDICT = Status("undecided", "?", "UNDECIDED", loud=True)
+
 CASE_STATUS = {"passed": PASSED, "failed": FAILED, "error": ERROR}
-VERDICT_STATUS = {"pass": PASSED, "fail": FAILED, "measured": MEASURED}
+VERDICT_STATUS = {
+    "pass": PASSED,
+    "fail": FAILED,
+    "measured": MEASURED,
+    "expected-fail": EXPECTED_FAIL,
+    "unexpected-pass": UNEXPECTED_PASS,
+    "undecided": UNDECIDED_VERDICT,
+}
+FAILURES = frozenset({"fail", "unexpected-pass", "undecided"})
+"""Verdicts that fail a campaign."""
+KINDS = ("verification", "expected-failure", "modelling")
+"""Families of rows, which a table never mixes."""
+
 CLAIM_STATUS = {True: HOLDS, False: REFUTED, None: UNDECIDED}
 
 

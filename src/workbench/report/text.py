@@ -11,6 +11,9 @@ from markupsafe import Markup
 PERCENT_FROM = 1e-4
 """From this size on, a verification error is also written in percent."""
 
+WHOLE_PERCENT_FROM = 9.995
+"""From this fraction on, a percentage is written in whole numbers and not as a power of ten."""
+
 _MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]|#~$])")
 _LINE_START = re.compile(r"^(?:([-+=])(?=[-=\s]|$)|(\d{1,9})([.)])(?=\s|$))")
 
@@ -34,6 +37,8 @@ def percent(value: float) -> str:
     """Write a fraction as a percentage with three significant digits."""
     if not math.isfinite(value):
         return exact(value)
+    if abs(value) >= WHOLE_PERCENT_FROM:
+        return f"{100 * value:.0f} %"
     return f"{100 * value:#.3g}".rstrip(".") + " %"
 
 
@@ -46,6 +51,13 @@ def exact(value: float | None, digits: int = 4) -> str:
     if math.isinf(value):
         return "infinite" if value > 0 else "-infinite"
     return f"{value:.{digits}g}"
+
+
+def quantity(value: float | None, unit: str, digits: int = 4) -> str:
+    """Write a number with its unit; a fraction whose unit is ``%`` becomes a percentage."""
+    if value is None:
+        return "–"
+    return f"{exact(100 * value, digits)} %" if unit == "%" else with_unit(exact(value, digits), unit)
 
 
 def count(value: int | None) -> str:
@@ -68,7 +80,7 @@ def escape_markdown(value: object) -> Markup:
     text = " ".join("".join(c if c >= " " else " " for c in str(value)).split())
     text = _MARKDOWN_SPECIAL.sub(r"\\\1", text)
     text = _LINE_START.sub(lambda match: f"\\{match[1]}" if match[1] else f"{match[2]}\\{match[3]}", text)
-    return Markup(html.escape(text, quote=False))  # noqa: S704 - this is the escaping
+    return Markup(html.escape(text, quote=False))
 
 
 def finalize_markdown(value: object) -> Markup:
@@ -80,7 +92,7 @@ def fenced(text: str) -> Markup:
     """Return *text* as a fenced block of Markdown, with a fence longer than any run of backticks in it."""
     longest = max((len(run) for run in re.findall(r"`+", text)), default=0)
     fence = "`" * max(3, longest + 1)
-    return Markup(f"{fence}text\n{text}\n{fence}")  # noqa: S704 - the fence is the escaping
+    return Markup(f"{fence}text\n{text}\n{fence}")
 
 
 def slug(text: str, limit: int = 40) -> str:

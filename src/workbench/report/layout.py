@@ -1,0 +1,86 @@
+"""Where panels and legends of a figure stand, and how its axes are labelled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter
+
+from workbench.report.style import INK
+
+SMALLEST_DRAWN = 1e-17
+"""Errors below this, zero among them, are drawn here: a logarithmic axis has no zero."""
+SMALL = (4.4, 3.4)
+TALL = (4.4, 4.1)
+WIDE = (5.8, 3.9)
+
+
+def log_axis(axes: Axes, low: float, high: float) -> None:
+    """Make the y axis logarithmic: whole decades, at most five labelled, written as plain text."""
+    bottom = math.floor(math.log10(max(low, SMALLEST_DRAWN)))
+    top = max(math.ceil(math.log10(high * 1.5)) if high < math.inf else 3, bottom + 2)
+    axes.set_yscale("log")
+    axes.set_ylim(10.0**bottom, 10.0**top)
+    step = math.ceil((top - bottom) / 4)
+    axes.yaxis.set_major_locator(FixedLocator([10.0**power for power in range(bottom, top + 1, step)]))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"1e{round(math.log10(value))}"))
+    axes.minorticks_off()
+
+
+def stack(figure: Figure, heights: Sequence[float], header: int = 0) -> list[Axes]:
+    """Put panels one above the other on one time axis; *header* is the lines of room for a legend above them."""
+    width, height = figure.get_size_inches()
+    left, right, bottom, gap = 0.62 / width, 1 - 0.12 / width, 0.42 / height, 0.14 / height
+    top = 1 - (0.1 + 0.165 * header) / height
+    room = top - bottom - gap * (len(heights) - 1)
+    panels: list[Axes] = []
+    for share in heights:
+        panel = room * share / sum(heights)
+        axes = figure.add_axes((left, top - panel, right - left, panel), sharex=panels[0] if panels else None)
+        axes.locator_params(nbins=5)
+        axes.margins(x=0.01)
+        top -= panel + gap
+        panels.append(axes)
+    for axes in panels[:-1]:
+        axes.tick_params(labelbottom=False)
+    panels[-1].set_xlabel("time [s]")
+    figure.align_ylabels(panels)
+    return panels
+
+
+def legend_rows(count: int, columns: int = 2) -> int:
+    """Return how many lines a legend of *count* entries takes."""
+    return math.ceil(count / columns)
+
+
+def figure_legend(figure: Figure, axes: Axes, columns: int = 2) -> None:
+    """Put the legend of *axes* above all panels."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        figure.legend(
+            handles,
+            labels,
+            loc="upper left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=columns,
+            borderaxespad=0.2,
+            labelspacing=0.25,
+            columnspacing=1.2,
+            handlelength=2.6,
+        )
+
+
+def legend(axes: Axes) -> None:
+    """Put the legend inside the panel, above the curves."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.18 * (high - low))  # room for the legend above the curves
+    axes.legend(loc="upper right", ncols=4, borderaxespad=0.1, columnspacing=1.2, handlelength=2.4)
+
+
+def mark(axes: Axes, time: float, value: float, text: str) -> None:
+    """Mark one moment of a curve with a triangle and a number."""
+    axes.plot([time], [value], "v", color=INK, markersize=4.5)
+    axes.annotate(text, (time, value), (0, 4), textcoords="offset points", ha="center", va="bottom", fontsize=8)

@@ -1,0 +1,92 @@
+"""The verdict in one sentence, and what was put to the test."""
+
+from __future__ import annotations
+
+from workbench.report.load import Run
+from workbench.report.section import Section
+from workbench.report.tables import (
+    ERROR_VERDICT,
+    FAILED,
+    FAILURES,
+    PASSED_VERDICT,
+    UNDECIDED_VERDICT,
+    Cell,
+    Status,
+    Table,
+    columns,
+)
+from workbench.report.text import exact, scientific
+
+
+def verdict_section(run: Run) -> Section:
+    """Say in one sentence whether every bound holds, and list the formulas that were tested."""
+    status, sentence = verdict(run)
+    sentence = sentence[:1].upper() + sentence[1:]
+    timed = any(candidate.cost_us is not None for candidate in run.manifest.candidates.values())
+    names = ("Candidate", "Mass model", "What it is", "Source", *(("Cost [µs per sample]",) if timed else ()))
+    table = Table(
+        "candidates",
+        "The candidates: the formulas that this campaign puts to the test.",
+        columns(names, numeric=names[4:]),
+        tuple(
+            (
+                Cell(name),
+                Cell(candidate.mass_model),
+                Cell(candidate.description),
+                Cell(candidate.source),
+                *((Cell(exact(candidate.cost_us, 3), candidate.cost_us),) if timed else ()),
+            )
+            for name, candidate in run.manifest.candidates.items()
+        ),
+        "The mass model is the assumption about the bars' masses that a formula shares with its reference."
+        + (" The cost is timed in the run and is the one figure that differs from run to run." if timed else ""),
+    )
+    context = {"status": status, "sentence": sentence, "manifest": run.manifest, "tables": [table]}
+    return Section("verdict", "Verdict", "verdict", context)
+
+
+def verdict(run: Run) -> tuple[Status, str]:
+    """Return the overall status and the sentence; a failed row or case is never hidden by the manifest's own status."""
+    cases = run.manifest.cases
+    checks = [row for row in run.rows if row.verdict in ("pass", "fail")]
+    failed = [row for row in checks if row.verdict == "fail"]
+    declared = [row for row in run.rows if row.verdict in ("expected-fail", "unexpected-pass")]
+    unseen = [row for row in declared if row.verdict == "unexpected-pass"]
+    broken = [name for name, record in cases.items() if record.status == "error"]
+    # A case can fail with every row within its bound: its kinematics disagree, and its message says so.
+    accused = {row.case for row in run.rows if row.verdict in FAILURES}
+    other = [name for name, record in cases.items() if record.status == "failed" and name not in accused]
+
+    worst = max(checks, key=lambda row: row.badness, default=None)
+    where = ""
+    if worst is not None:
+        where = (
+            f"worst is {worst.candidate} on joint {worst.joint} in case {worst.case}: "
+            f"{scientific(worst.peak_error)} of the "
+            f"reference's peak against a bound of {exact(worst.bound)}"
+        )
+    bad = []
+    if failed:
+        bad.append(f"{len(failed)} of {len(checks)} checks exceed their bound ({where})")
+    if unseen:
+        bad.append(f"{len(unseen)} of {len(declared)} declared failures did not happen")
+    if other:
+        bad.append(f"{_cases(len(other))} failed for another reason ({', '.join(other)})")
+    if broken:
+        bad.append(f"{len(broken)} of {_cases(len(cases))} could not be computed ({', '.join(broken)})")
+    if failed or unseen or other or run.manifest.status == "failed":
+        return FAILED, f"{', and '.join(bad) or 'the run says so, though no row of it does'}."
+    if broken or run.manifest.status == "error":
+        held = f"; the {len(checks)} checks that were made hold their bounds" if checks else ""
+        return ERROR_VERDICT, f"{', and '.join(bad) or 'the run ended in an error'}{held}."
+    seen = f"all {len(declared)} declared failures show" if declared else ""
+    if not checks:
+        if not declared:
+            return UNDECIDED_VERDICT, "no formula was held against a bound, so nothing is verified."
+        return PASSED_VERDICT, f"{seen} in {_cases(len(cases))}; no other check was made."
+    also = f", and {seen}" if seen else ""
+    return PASSED_VERDICT, f"all {len(checks)} checks in {_cases(len(cases))} hold their bounds{also}; {where}."
+
+
+def _cases(number: int) -> str:
+    return f"{number} case" if number == 1 else f"{number} cases"
