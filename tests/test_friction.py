@@ -13,6 +13,7 @@ import pytest
 import planar_4rprp_cases as planar
 import workbench as wb
 from robots import MODEL, Motion, motion_inside, peak_error, random_changes, slope, write_model
+from workbench.campaign.run import run_campaign
 from workbench.dry_friction import REST_SPEED, direction
 from workbench.errors import ModelError, ParameterError
 from workbench.mechanisms.base import Mechanism
@@ -398,3 +399,13 @@ def test_the_reference_adds_dry_friction_of_any_mechanism(tmp_path: Path) -> Non
     rough = wb.MujocoReference(write_model(tmp_path, CRANK.format('frictionloss="0.7"', 'damping="0.2"'), GEARED))
     added = rough.inverse_dynamics(q, qd, qdd).tau - without
     assert added[:, 0] == pytest.approx([-0.7 - 0.4, 0.0, 0.7 + 0.6], abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["friction_2rss_ppap", "friction_4rprp"])
+def test_the_campaigns_hold_their_bounds(name: str, tmp_path: Path) -> None:
+    file = Path(MODEL).parents[1] / "campaigns" / f"{name}.toml"
+    outcome = run_campaign(file, tmp_path / "run", only=("everything",))
+    assert outcome.passed
+    assert all(row.peak_error < ROUND_OFF for row in outcome.rows if row.bound is not None)
+    smooth = dict.fromkeys(DRIVES, 0.0)
+    assert run_campaign(file, tmp_path / "smooth", only=("everything",), settings=smooth).passed
