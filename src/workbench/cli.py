@@ -71,11 +71,18 @@ def run(
     model: Annotated[
         Path | None, typer.Option(metavar="FILE", help="MJCF file in place of the campaign's own.")
     ] = None,
+    engines: Annotated[
+        str, typer.Option(metavar="LIST", help="mujoco, or mujoco,pinocchio to check the reference by a second engine.")
+    ] = "mujoco",
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Errors only: no power balance, no forward replay, no raw mj_inverse.")
+    ] = False,
 ) -> None:
     """Run a campaign: closed forms against MuJoCo, with a table of errors, a verdict and a report.
 
     Exit code 0: every bound holds; 1: a bound fails; 2: bad input, and nothing was written.
     """
+    from workbench.campaign.evidence import Effort
     from workbench.campaign.run import run_campaign
     from workbench.console import CaseProgress, print_outcome
     from workbench.report import build_report
@@ -90,6 +97,7 @@ def run(
             command=["workbench", *sys.argv[1:]],
             progress=progress,
             report=build_report,
+            effort=Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick),
         )
     print_outcome(outcome)
     if not outcome.passed:

@@ -19,6 +19,7 @@ from rich.text import Text
 from workbench.campaign.compare import Row
 from workbench.campaign.run import Outcome
 from workbench.campaign.verdict import (
+    CONTRAST,
     EXPECTED_FAIL,
     EXPECTED_FAILURE,
     FAIL,
@@ -26,6 +27,7 @@ from workbench.campaign.verdict import (
     MEASURED,
     MODELLING,
     PASS,
+    UNDECIDED,
     UNEXPECTED_PASS,
     VERIFICATION,
 )
@@ -46,7 +48,8 @@ out = _console(stderr=False)
 err = _console(stderr=True)
 
 STYLES = {
-    FAIL: "bold red", UNEXPECTED_PASS: "bold red", EXPECTED_FAIL: "yellow", PASS: "green", MEASURED: "cyan",
+    FAIL: "bold red", UNEXPECTED_PASS: "bold red", UNDECIDED: "bold magenta", EXPECTED_FAIL: "yellow",
+    PASS: "green", MEASURED: "cyan",
 }  # fmt: skip
 """Colour of each verdict; a row of the table shows the first of them that one of its joints has."""
 
@@ -89,6 +92,7 @@ def print_outcome(outcome: Outcome) -> None:
         (VERIFICATION, "Verification: closed form against MuJoCo, same masses", _scientific),
         (EXPECTED_FAILURE, "Declared failures: what each mistake costs, joint by joint", _percent),
         (MODELLING, "Modelling error: what the simpler mass model costs", _percent),
+        (CONTRAST, "For contrast: MuJoCo's inverse dynamics without projection", _percent),
     )
     for kind, title, show in tables:
         rows = [row for row in outcome.rows if row.kind == kind]
@@ -114,7 +118,10 @@ def print_outcome(outcome: Outcome) -> None:
 def _verdict(outcome: Outcome) -> Text:
     cases = outcome.manifest["cases"]
     verdicts = Counter(row.verdict for row in outcome.rows)
-    checks, declared = verdicts[PASS] + verdicts[FAIL], verdicts[EXPECTED_FAIL] + verdicts[UNEXPECTED_PASS]
+    checks, declared = (
+        verdicts[PASS] + verdicts[FAIL] + verdicts[UNDECIDED],
+        verdicts[EXPECTED_FAIL] + verdicts[UNEXPECTED_PASS],
+    )
     if outcome.passed:
         worst = max((row.peak_error for row in outcome.rows if row.verdict == PASS), default=math.nan)
         parts = (
@@ -122,7 +129,11 @@ def _verdict(outcome: Outcome) -> Text:
         )
         parts += [f"{declared} declared failures seen"] if declared else []
         return Text(f"PASSED: {'; '.join(parts) or 'nothing to judge'}.", style="bold green")
-    parts = [f"{verdicts[FAIL]} of {checks} checks beyond their bounds"] if checks else []
+    parts = [f"{verdicts[FAIL]} of {checks} checks beyond their bounds"] if verdicts[FAIL] else []
+    if verdicts[UNDECIDED]:
+        parts.append(
+            f"{verdicts[UNDECIDED]} undecided: the reference's own uncertainty is not below a tenth of the bound"
+        )
     if verdicts[UNEXPECTED_PASS]:
         parts.append(f"{verdicts[UNEXPECTED_PASS]} of {declared} declared failures did not happen")
     names = ", ".join(name for name, case in cases.items() if case["status"] != "passed")

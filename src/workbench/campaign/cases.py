@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,7 +23,17 @@ from workbench.data_files import bundled, bundled_names
 from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
 from workbench.mechanisms.base import SIDES, Mechanism
 from workbench.mjcf import load_model
-from workbench.motion import JointMotion, PlatformMotion, from_csv, multi_sine, pick_and_place, sine, time_grid
+from workbench.motion import (
+    JointMotion,
+    PickAndPlace,
+    PlatformMotion,
+    from_csv,
+    multi_sine,
+    pick_and_place,
+    sine,
+    time_grid,
+)
+from workbench.reference.replay import motion_through
 
 
 @dataclass(frozen=True)
@@ -95,7 +105,7 @@ def resolve_cases(
 
 
 def layered(*layers: Mapping[str, float]) -> dict[str, float]:
-    """Merge parameters, later layers over earlier ones; ``m2`` of a later layer also goes over an earlier ``m2_left``."""
+    """Merge parameters, later layers over earlier ones; a later ``m2`` also goes over an earlier ``m2_left``."""
     merged: dict[str, float] = {}
     for layer in layers:
         for name in layer:
@@ -205,7 +215,7 @@ def at_time(error: MotionError, t: FloatArray) -> MotionError:
 
 
 def plan_motion(spec: CaseSpec, file: Path, mechanism: Mechanism) -> JointMotion | PlatformMotion:
-    """Build the motion that a case asks for.
+    """Build the motion that a case asks for, at the times that it asks for.
 
     Raises
     ------
@@ -225,7 +235,38 @@ def plan_motion(spec: CaseSpec, file: Path, mechanism: Mechanism) -> JointMotion
             f"motion: {len(motion.offset)} offset(s) and {joints} joint(s); {mechanism.name} has"
             f" {len(mechanism.joints)} actuated joints: {', '.join(mechanism.joints)}"
         )
-    t = time_grid(motion.start, motion.stop, samples=motion.samples, rate=motion.rate)
+    return _harmonic(motion, time_grid(motion.start, motion.stop, samples=motion.samples, rate=motion.rate))
+
+
+def _harmonic(motion: SineMotion | MultiSineMotion, t: FloatArray) -> JointMotion:
     if isinstance(motion, SineMotion):
         return sine(t, motion.offset, motion.amplitude, motion.frequency, motion.phase)
     return multi_sine(t, motion.offset, motion.terms)
+
+
+Course = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+"""Times ``(n,)`` in seconds -> q, qd, qdd, each ``(n, na)``."""
+
+
+def course_of(case: Case) -> Course:
+    """Return the case's motion as a function of time: exact where it is given by formulas, else through its samples.
+
+    The function raises MotionError for times or poses that the motion does not have.
+    """
+    motion = case.spec.motion
+    if isinstance(motion, SineMotion | MultiSineMotion):
+
+        def harmonic(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            found = _harmonic(motion, t)
+            return found.q, found.qd, found.qdd
+
+        return harmonic
+    if isinstance(motion, CycleMotion):
+        plan = PickAndPlace(**motion.model_dump(exclude={"kind", "samples", "rate"}))
+
+        def cycle(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            found = plan.sample(np.clip(t, 0.0, plan.duration))
+            return case.mechanism.joint_motion(found.x, found.xd, found.xdd)
+
+        return cycle
+    return motion_through(case.motion.t, case.motion.q, case.motion.qd, case.motion.qdd)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,11 +11,23 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case, at_time
+from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
 from workbench.campaign.spec import Campaign, CandidateSpec
-from workbench.campaign.unloaded import joint_error, largest_reaction
-from workbench.campaign.verdict import FAILURES, kind_of, verdict_of
+from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
+from workbench.campaign.verdict import CONTRAST, FAILURES, kind_of, verdict_of
 from workbench.errors import ArrayError, MotionError
 from workbench.reference import MujocoReference, ReferenceResult
+from workbench.reference.raw_inverse import raw_mj_inverse
+
+RAW_INVERSE = "raw mj_inverse"
+"""Name of the row that shows MuJoCo's inverse dynamics as it comes."""
+
+RAW_DESCRIPTION = {
+    "mass_model": "distributed",
+    "description": "mj_inverse as it comes, without projecting the constraint forces out: not a candidate, a contrast",
+    "source": "docs/evidence.md",
+}
+RAW_NAME = "raw"
 
 KINEMATICS_BOUND = 1e-11
 """Largest difference of platform position, velocity or acceleration between closed form and MuJoCo, over their peaks:
@@ -39,6 +52,12 @@ class Row:
     unit: str
     peak_reference: float
     pointwise_skipped: int
+    normaliser: float
+    """what the absolute errors are divided by: `peak_reference`, unless the joint is unloaded"""
+    uncertainty: float
+    """the reference's own, relative: the larger of the two that follow; NaN where neither was looked at"""
+    power_residual: float
+    engine_spread: float
 
 
 @dataclass(frozen=True)
@@ -51,8 +70,8 @@ class CaseResult:
     facts: dict[str, Any] = field(repr=False)
 
 
-def compute_case(campaign: Campaign, case: Case) -> CaseResult:
-    """Compute one case.
+def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseResult:
+    """Compute one case, with the evidence that *effort* asks for.
 
     Raises
     ------
@@ -74,11 +93,14 @@ def compute_case(campaign: Campaign, case: Case) -> CaseResult:
             torques[name] = tau
     except MotionError as error:
         raise at_time(error, motion.t) from error
+    evidence = gather_evidence(case, reference, results, list(torques), effort)
     rows = [
         row
         for candidate in campaign.candidate
-        for row in _rows(case, candidate, torques[candidate.name], results[candidate.reference])
+        for row in _rows(case, candidate, torques[candidate.name], results[candidate.reference], evidence)
     ]
+    if effort.budget:
+        rows += _raw_rows(case, reference, results, evidence)
     for mass_model, result in results.items():
         series |= _columns(f"ref_{mass_model}", result.tau, mechanism.joints)
     for name, tau in torques.items():
@@ -87,14 +109,30 @@ def compute_case(campaign: Campaign, case: Case) -> CaseResult:
     for joint, force in first.reactions.items():
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual
-    return CaseResult(case.name, rows, series, _facts(case, reference, first, rows))
+    facts = _facts(case, reference, first, rows) | {"evidence": evidence.facts()}
+    return CaseResult(case.name, rows, series, facts)
 
 
-def _rows(case: Case, candidate: CandidateSpec, tau: FloatArray, reference: ReferenceResult) -> list[Row]:
+def _raw_rows(
+    case: Case, reference: MujocoReference, results: Mapping[str, ReferenceResult], evidence: Evidence
+) -> list[Row]:
+    """What `mj_inverse` gives without projection, beside the candidates: why the reference projects."""
+    motion = case.motion
+    name = "distributed" if "distributed" in results else next(iter(results))
+    spec = CandidateSpec(name=RAW_NAME, reference=name)
+    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force)
+    rows = _rows(case, spec, tau, results[name], evidence)
+    return [dataclasses.replace(row, candidate=RAW_INVERSE, kind=CONTRAST) for row in rows]
+
+
+def _rows(
+    case: Case, candidate: CandidateSpec, tau: FloatArray, reference: ReferenceResult, evidence: Evidence
+) -> list[Row]:
     rows = []
     reaction = largest_reaction(reference.reactions.values())
     for i, joint in enumerate(case.mechanism.joints):
         error = joint_error(tau[:, i], reference.tau[:, i], reaction)
+        uncertainty = evidence.uncertainty(candidate.reference, joint)
         rows.append(
             Row(
                 case=case.name,
@@ -106,11 +144,15 @@ def _rows(case: Case, candidate: CandidateSpec, tau: FloatArray, reference: Refe
                 pointwise_error=error.pointwise_error,
                 worst_time_s=float(case.motion.t[error.worst_index]),
                 bound=candidate.bound,
-                verdict=verdict_of(candidate, case.name, joint, error.peak_error),
+                verdict=verdict_of(candidate, case.name, joint, error.peak_error, uncertainty),
                 kind=kind_of(candidate),
                 unit=case.mechanism.force_units[i],
                 peak_reference=error.peak_reference,
                 pointwise_skipped=error.pointwise_skipped,
+                normaliser=normaliser_of(error, reaction),
+                uncertainty=uncertainty,
+                power_residual=evidence.power_residual(candidate.reference),
+                engine_spread=evidence.engine_spread(candidate.reference, joint),
             )
         )
     return rows

@@ -14,8 +14,9 @@ from typing import Any
 from workbench.campaign import provenance, store
 from workbench.campaign.cases import Case, resolve_cases
 from workbench.campaign.claims import judge_claims
-from workbench.campaign.compare import CaseResult, Row, compute_case
+from workbench.campaign.compare import RAW_DESCRIPTION, RAW_INVERSE, CaseResult, Row, compute_case
 from workbench.campaign.cost import cost_us
+from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.errors import WorkbenchError
 from workbench.mechanisms.base import stored_names
@@ -46,6 +47,7 @@ def run_campaign(
     command: Sequence[str] = (),
     progress: Progress | None = None,
     report: Callable[[Path], object] | None = None,
+    effort: Effort = FULL,
 ) -> Outcome:
     """Run a campaign and write its run directory.
 
@@ -67,6 +69,8 @@ def run_campaign(
         Called before each case.
     report
         Called with the directory when the results stand in it, before it is moved to its place.
+    effort
+        How much evidence is gathered beside the errors, and with which engines.
 
     Raises
     ------
@@ -77,13 +81,14 @@ def run_campaign(
     campaign, file = load_campaign(path)
     directory = out or Path("reports") / campaign.name
     check_output(directory, store.RUN)
+    check_engines(effort.engines)
     cases = resolve_cases(campaign, file, model, tuple(only), settings)
     results: list[CaseResult] = []
     with staged(directory) as stage:
         for number, case in enumerate(cases):
             if progress:
                 progress(case.name, number, len(cases))
-            results.append(_compute(campaign, case, file))
+            results.append(_compute(campaign, case, file, effort))
             store.write_series(stage, case.name, results[-1].series)
         if progress:
             progress("", len(cases), len(cases))
@@ -96,6 +101,8 @@ def run_campaign(
             "finished": datetime.now(UTC).isoformat(timespec="seconds"),
             "seconds": round(time.perf_counter() - clock, 3),
             "status": "passed" if passed else "failed",
+            "engines": list(effort.engines),
+            "budget": effort.budget,
         }
         store.write_summary(stage, rows)
         store.write_manifest(stage, manifest)
@@ -104,11 +111,18 @@ def run_campaign(
     return Outcome(directory, passed, rows, manifest)
 
 
-def _compute(campaign: Campaign, case: Case, file: Path) -> CaseResult:
+def _compute(campaign: Campaign, case: Case, file: Path, effort: Effort) -> CaseResult:
     try:
-        return compute_case(campaign, case)
+        return compute_case(campaign, case, effort)
     except WorkbenchError as error:
         raise type(error)(f'{file}: case "{case.name}": {error}', **{**error.facts, "case": case.name}) from error
+
+
+def _shown(path: Path, campaign_file: Path) -> str:
+    """Return a path as others can follow it: from the directory above the campaign's, where it lies below that."""
+    above = campaign_file.resolve().parent.parent
+    found = path.resolve()
+    return found.relative_to(above).as_posix() if found.is_relative_to(above) else path.name
 
 
 def _manifest(
@@ -123,10 +137,10 @@ def _manifest(
         "campaign": campaign.name,
         "title": campaign.title,
         "description": campaign.description,
-        "spec_file": str(file),
+        "spec_file": _shown(file, file),
         "spec": campaign.model_dump(),
         "model": {
-            "file": str(model),
+            "file": _shown(model, file),
             "sha256": provenance.sha256(model.read_bytes()),
             "mechanism": mechanism.name,
             "title": mechanism.title,
@@ -149,7 +163,8 @@ def _manifest(
                 "cost_us": cost_us(cases[0], name),
             }
             for name, c in candidates.items()
-        },
+        }
+        | ({RAW_INVERSE: RAW_DESCRIPTION} if any(row.candidate == RAW_INVERSE for row in rows) else {}),
         "claims": judge_claims(campaign, rows, facts),
         "figures": [kept.model_dump() for figure in campaign.figure if (kept := figure.among(set(facts)))],
         "cases": dict(facts),

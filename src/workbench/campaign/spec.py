@@ -110,6 +110,13 @@ class CandidateSpec(Strict):
         return self
 
 
+class ReplayWindow(Strict):
+    """Seconds from start to stop over which torques drive the model; the motion may be defined beyond its samples."""
+
+    start: Finite
+    stop: Finite
+
+
 class CaseSpec(Strict):
     """One robot on one motion."""
 
@@ -119,6 +126,8 @@ class CaseSpec(Strict):
     motion: Motion
     parameters: dict[str, Finite] = Field(default_factory=dict)
     external_force: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    replay: ReplayWindow | None = None
+    """window of the forward replay; None is the case's own samples"""
 
 
 class Measure(Strict):

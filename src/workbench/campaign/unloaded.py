@@ -25,6 +25,11 @@ def largest_reaction(reactions: Iterable[FloatArray]) -> float:
     return max((float(np.linalg.norm(force, axis=1).max()) for force in reactions), default=0.0)
 
 
+def normaliser_of(error: JointError, reaction: float) -> float:
+    """Return what `joint_error` divides by, in the joint's unit."""
+    return error.peak_reference if not error.peak_reference < UNLOADED * reaction else UNLOADED * reaction
+
+
 def joint_error(candidate: FloatArray, reference: FloatArray, reaction: float) -> JointError:
     """Compare two time series ``(n,)`` of one joint; where it is unloaded, in fractions of ``UNLOADED * reaction``.
 

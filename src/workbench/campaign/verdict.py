@@ -15,13 +15,19 @@ FAIL = "fail"
 MEASURED = "measured"
 EXPECTED_FAIL = "expected-fail"
 UNEXPECTED_PASS = "unexpected-pass"
+UNDECIDED = "undecided"
 
-FAILURES = frozenset({FAIL, UNEXPECTED_PASS})
+FAILURES = frozenset({FAIL, UNEXPECTED_PASS, UNDECIDED})
 """Verdicts that fail a campaign."""
 
 VERIFICATION = "verification"
 MODELLING = "modelling"
 EXPECTED_FAILURE = "expected-failure"
+CONTRAST = "contrast"
+"""rows that show what happens without the reference's projection; nothing judges them"""
+
+SHARE = 0.1
+"""A verdict counts only where the reference's uncertainty is below this share of the bound or error that it judges."""
 
 
 def kind_of(candidate: CandidateSpec) -> str:
@@ -31,14 +37,18 @@ def kind_of(candidate: CandidateSpec) -> str:
     return EXPECTED_FAILURE if candidate.expect_fail else VERIFICATION
 
 
-def verdict_of(candidate: CandidateSpec, case: str, joint: str, peak_error: float) -> str:
-    """Judge one row.
+def verdict_of(
+    candidate: CandidateSpec, case: str, joint: str, peak_error: float, uncertainty: float = math.nan
+) -> str:
+    """Judge one row; *uncertainty* is the reference's own, relative, NaN where nobody looked.
 
     An error that is not a finite number fails, declared or not: a misprint gives wrong numbers, not none.
     """
     if candidate.bound is None:
         return MEASURED
     within = peak_error <= candidate.bound
+    if uncertainty >= SHARE * (candidate.bound if within else peak_error):
+        return UNDECIDED
     if joint not in candidate.expect_fail.get(case, ()):
         return PASS if within else FAIL
     if not math.isfinite(peak_error):
