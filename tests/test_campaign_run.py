@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -332,7 +333,29 @@ def test_the_readme_example_runs_and_prints_what_it_says(
     code = text.split("```python\n")[1].split("```")[0]
     monkeypatch.chdir(tmp_path)
     exec(compile(code, "README.md", "exec"), {})
-    printed = capsys.readouterr().out.split()
-    expected = [line.split("# prints ")[1].split() for line in code.splitlines() if "# prints " in line]
-    assert printed == [word for words in expected for word in words]
-    assert len(code.strip().splitlines()) <= 14
+    expected = [line.removeprefix("# prints ") for line in code.splitlines() if line.startswith("# prints ")]
+    assert expected
+    assert capsys.readouterr().out.splitlines() == expected
+
+
+def test_links_of_the_pages_lead_somewhere(repository: Path) -> None:
+    pages = [repository / "README.md", *(repository / "docs").glob("*.md")]
+    assert len(pages) > 4
+    for page in pages:
+        targets = re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8"))
+        missing = [t for t in targets if not t.startswith("http") and not (page.parent / t).exists()]
+        assert missing == [], page
+
+
+def test_the_readme_quotes_the_campaign(repository: Path, workbench: Workbench) -> None:
+    """The table of modelling errors in the README is what the campaign of the paper measures."""
+    text = (repository / "README.md").read_text(encoding="utf-8")
+    done = workbench("run", "almeida_2010", "--out", "run")
+    assert done.code == 0, done
+    rows = summary(workbench, "run")
+    for case, group in rows[rows.kind == "modelling"].groupby("case", sort=False):
+        line = next(line for line in text.splitlines() if line.startswith(f"| {case}"))
+        assert line.endswith(f"| {', '.join(f'{100 * error:.2f} %' for error in group.peak_error)} |")
+    assert rows[rows.kind == "verification"].peak_error.max() < 1e-12
+    assert "seven are confirmed" in " ".join(text.split())
+    assert [claim["holds"] for claim in manifest(workbench, "run")["claims"]].count(True) == 7
