@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from robots import Motion, motion_inside, peak_error, table_1
+from workbench.campaign.evidence import Effort
 from workbench.campaign.run import Outcome, run_campaign
 from workbench.campaign.spec import CandidateSpec, load_campaign
 from workbench.campaign.verdict import kind_of, verdict_of
@@ -17,6 +18,7 @@ from workbench.mechanisms.asym_2rss_ppap_candidates import CANDIDATES, MISPRINT_
 from workbench.mechanisms.asym_2rss_ppap_literal import APPENDIX_AS_PRINTED, Misprint, lumped_appendix
 
 BOUND = 1e-10
+ERRORS_ONLY = Effort(budget=False)
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +28,7 @@ def campaign_file(repository: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def outcome(campaign_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Outcome:
-    return run_campaign(campaign_file, tmp_path_factory.mktemp("as_printed") / "run")
+    return run_campaign(campaign_file, tmp_path_factory.mktemp("as_printed") / "run", effort=ERRORS_ONLY)
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +171,7 @@ def test_a_declared_failure_has_to_happen_and_no_other_may(
 ) -> None:
     file = tmp_path / "declared.toml"
     file.write_text(SPOILED.format(candidate=candidate, declared=declared), encoding="utf-8")
-    outcome = run_campaign(file, tmp_path / "run")
+    outcome = run_campaign(file, tmp_path / "run", effort=ERRORS_ONLY)
     assert [row.verdict for row in outcome.rows] == verdicts
     assert outcome.passed is passed
     assert (

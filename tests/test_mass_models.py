@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import workbench as wb
 from robots import MODEL, Motion, motion_inside, peak_error, random_changes, table_1
+from workbench.campaign.evidence import Effort
 from workbench.campaign.run import Outcome, run_campaign
 from workbench.errors import ParameterError
 from workbench.mechanisms.base import Mechanism
@@ -30,6 +31,7 @@ from workbench.mechanisms.mass_models import (
 
 ROUND_OFF = 1e-12
 BOUND = 1e-10  # against MuJoCo
+ERRORS_ONLY = Effort(budget=False)
 UNIFORM = Bar(mass=0.3, inertia=0.3 * 0.3**2 / 12, length=0.3, fraction=0.5)
 TIME = np.linspace(0.0, 1.0, 60)
 
@@ -254,7 +256,7 @@ def test_without_weight_the_error_does_not_depend_on_the_frequency() -> None:
 def outcome(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Outcome:
     out = tmp_path_factory.mktemp("mass_models") / "run"
     only = ("slow", "fast", "rate_1", "rate_10", "rate_40")
-    return run_campaign(repository / "campaigns" / "mass_models.toml", out, only=only)
+    return run_campaign(repository / "campaigns" / "mass_models.toml", out, only=only, effort=ERRORS_ONLY)
 
 
 def measured(outcome: Outcome, case: str, candidate: str) -> list[float]:
