@@ -32,7 +32,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
 ENGINE_LAYERS = ("mjcf", "reference")
 """The only places that may import mujoco."""
 
-NEUTRAL_MECHANISM_MODULES = ("workbench.mechanisms.base",)
+NEUTRAL_MECHANISM_MODULES = ("workbench.mechanisms.base", "workbench.mechanisms.parameters")
 """What the reference may see of the closed forms: the interface, no formula."""
 
 HEAVY = ("mujoco", "numba", "pandas", "matplotlib", "scipy", "pinocchio")

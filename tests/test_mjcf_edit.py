@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from robots import peak_error
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, OutputError, ParameterError, WorkbenchError
-from workbench.mechanisms.base import stored_names
+from workbench.mechanisms.parameters import stored_names
 from workbench.mjcf import LoadedModel, load_model
 from workbench.mjcf_edit import edit_file, parse_assignment, resolve_changes, resolve_for
 from workbench.mjcf_show import show_parameters

@@ -18,7 +18,8 @@ import numpy as np
 from workbench.data_files import bundled
 from workbench.errors import ModelError, ParameterError, WorkbenchError, did_you_mean
 from workbench.mechanisms import MECHANISMS, mechanism_class
-from workbench.mechanisms.base import Mechanism, changed_parameters
+from workbench.mechanisms.base import Mechanism
+from workbench.mechanisms.parameters import changed_parameters
 from workbench.mjcf_assumptions import Context, refuse_broken
 from workbench.mjcf_safety import MAX_BYTES, read_text
 from workbench.mjcf_text import Element, scan

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from workbench.errors import ModelError
-from workbench.mechanisms.base import Target
+from workbench.mechanisms.parameters import Target
 from workbench.mjcf_rules import ALIGNMENT, Assumption, Context
 from workbench.mjcf_structure import STRUCTURAL_CHECKS
 from workbench.mjcf_values import target_number, vector

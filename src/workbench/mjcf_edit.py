@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.errors import ModelError, OutputError, ParameterError
-from workbench.mechanisms.base import Mechanism, changed_parameters, expand_names, stored_names
+from workbench.mechanisms.base import Mechanism
+from workbench.mechanisms.parameters import changed_parameters, expand_names, stored_names
 from workbench.mjcf import LoadedModel, confirm, find_model, load_model, load_text, refuse_huge
 from workbench.mjcf_values import rewrite
 

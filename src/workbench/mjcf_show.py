@@ -7,7 +7,7 @@ from pathlib import Path
 
 from workbench.errors import ModelError
 from workbench.mechanisms import MECHANISMS
-from workbench.mechanisms.base import Target, stored_names
+from workbench.mechanisms.parameters import Target, stored_names
 from workbench.mjcf import load_model
 from workbench.mjcf_text import find, scan
 

@@ -17,7 +17,8 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, did_you_mean
-from workbench.mechanisms.base import Mechanism, Target, check_parameters
+from workbench.mechanisms.base import Mechanism
+from workbench.mechanisms.parameters import Target, check_parameters
 from workbench.mjcf_text import (
     PLAIN_DIGITS,
     Edit,

@@ -21,7 +21,8 @@ from workbench.campaign.spec import (
 )
 from workbench.data_files import bundled, bundled_names
 from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
-from workbench.mechanisms.base import SIDES, Mechanism
+from workbench.mechanisms.base import Mechanism
+from workbench.mechanisms.parameters import SIDES
 from workbench.mjcf import load_model
 from workbench.motion import (
     JointMotion,

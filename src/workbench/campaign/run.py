@@ -19,7 +19,7 @@ from workbench.campaign.cost import cost_us
 from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.errors import WorkbenchError
-from workbench.mechanisms.base import stored_names
+from workbench.mechanisms.parameters import stored_names
 from workbench.staging import check_output, staged
 
 

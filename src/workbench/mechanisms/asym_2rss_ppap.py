@@ -20,9 +20,10 @@ from workbench.mechanisms.asym_2rss_ppap_candidates import CANDIDATES
 from workbench.mechanisms.asym_2rss_ppap_friction import Friction
 from workbench.mechanisms.asym_2rss_ppap_kernel import SINGULAR
 from workbench.mechanisms.asym_2rss_ppap_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
-from workbench.mechanisms.base import Mechanism, ParameterInfo, Reach, Target, UniformRule
+from workbench.mechanisms.base import Mechanism, Reach
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.mass_models import mass_model as mass_model_of
+from workbench.mechanisms.parameters import ParameterInfo, Target, UniformRule
 
 ELBOWS = ("out", "in")
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from workbench.errors import ParameterError
-from workbench.mechanisms.base import SIDES, ParameterInfo, Target, UniformRule
 from workbench.mechanisms.friction import (
     HINGE_DAMPING,
     SLIDE_DAMPING,
@@ -16,6 +15,7 @@ from workbench.mechanisms.friction import (
     drive_targets,
 )
 from workbench.mechanisms.layout import BodyInfo, Layout, LoopInfo, X, Z
+from workbench.mechanisms.parameters import SIDES, ParameterInfo, Target, UniformRule
 
 TABLE_1 = "[Almeida2010] Table 1"
 UNIFORM = "uniform slender bar"

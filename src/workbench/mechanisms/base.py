@@ -1,13 +1,8 @@
-"""What every mechanism with a closed form is made of: parameters, their place in the MJCF, kinematics, candidates.
-
-Nothing here knows MuJoCo. A mechanism *describes* where its parameters live in an MJCF (`Target`); `workbench.mjcf`
-reads and writes them.
-"""
+"""What every mechanism with a closed form is made of: parameters, kinematics, candidates. Nothing here knows MuJoCo."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -19,72 +14,20 @@ from numpy.typing import ArrayLike, NDArray
 from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.errors import ParameterError, did_you_mean
 from workbench.mechanisms.layout import Layout
-
-SIDES = ("left", "right")
+from workbench.mechanisms.parameters import (
+    ParameterInfo,
+    Target,
+    UniformRule,
+    changed_parameters,
+    check_parameters,
+    stored_names,
+)
 
 NEAR_SINGULAR = 0.05
 """A pose is worth a warning when a scaled determinant is below this: a factor of twenty between forces and torques."""
 
 LONGEST_LINK = 20.0
 """Metres; no parallel robot of this kind has a longer link, so a longer one was written in millimetres."""
-
-
-@dataclass(frozen=True)
-class ParameterInfo:
-    """One parameter as a user meets it: name, unit, meaning, source and the values it may have."""
-
-    name: str
-    unit: str
-    meaning: str
-    source: str = ""
-    sided: bool = False
-    """True: stored as ``name_left`` and ``name_right``; the bare name sets both."""
-    minimum: float = -math.inf
-    minimum_allowed: bool = True
-    """False: the minimum itself is refused (a length of zero)."""
-    maximum: float = math.inf
-
-
-@dataclass(frozen=True)
-class Target:
-    """One number in the MJCF: ``attribute[index]`` of an element is ``factor`` times the product of parameters.
-
-    Parameters
-    ----------
-    element
-        MJCF tag: ``body``, ``inertial`` (named by its body), ``site``, ``geom``, ``joint`` or ``option``.
-    name
-        The element's name; for ``inertial`` its body's; for ``option`` the empty string.
-    attribute, index
-        The attribute and the position of the number in it.
-    factor
-        Constant factor, a sign or a power of two, so that reading it back loses nothing.
-    of
-        The parameters whose product, times factor, is the number.
-    reads
-        The parameter that is read back from this number, by dividing the others out; None for targets that only follow
-        (visible geoms, the second bar of a parallelogram).
-    """
-
-    element: str
-    name: str
-    attribute: str
-    index: int
-    factor: float
-    of: tuple[str, ...]
-    reads: str | None = None
-
-
-@dataclass(frozen=True)
-class UniformRule:
-    """Changing a parameter in ``when`` sets those in ``sets``, unless they (or one in ``unless``) are given too.
-
-    A bar whose mass or length changes stays a uniform slender bar.
-    """
-
-    when: tuple[str, ...]
-    sets: Mapping[str, Callable[[Mapping[str, float]], float]]
-    unless: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -315,86 +258,3 @@ class Mechanism(ABC):
         q, qd, qdd = as_batches(q=q, qd=qd, qdd=qdd)
         force = as_force("external_force", external_force, len(q))
         return self.torques(q, qd, qdd, mass_model, force) + self.friction(q, qd, qdd)
-
-
-def stored_names(table: tuple[ParameterInfo, ...]) -> dict[str, ParameterInfo]:
-    """Map each stored field name (``a2_left`` ...) to its description."""
-    names: dict[str, ParameterInfo] = {}
-    for info in table:
-        for name in [f"{info.name}_{side}" for side in SIDES] if info.sided else [info.name]:
-            names[name] = info
-    return names
-
-
-def expand_names(table: tuple[ParameterInfo, ...], changes: Mapping[str, float]) -> dict[str, float]:
-    """Resolve ``NAME`` to ``NAME_left`` and ``NAME_right`` where the parameter is sided; one-sided names win.
-
-    Raises
-    ------
-    ParameterError
-        Unknown name (with the nearest valid one), or a value that is not a real number.
-    """
-    stored = stored_names(table)
-    sided = {info.name for info in table if info.sided}
-    result: dict[str, float] = {}
-    for name in sorted(changes, key=lambda n: n in stored):
-        if isinstance(changes[name], bool) or not isinstance(changes[name], int | float | np.floating | np.integer):
-            raise ParameterError(f"parameter {name}: {changes[name]!r} is not a number", parameter=name)
-        value = float(changes[name])
-        if name in stored:
-            result[name] = value
-        elif name in sided:
-            result |= {f"{name}_{side}": value for side in SIDES}
-        else:
-            raise ParameterError(f'unknown parameter "{name}"{did_you_mean(name, {*stored, *sided})}', parameter=name)
-    return result
-
-
-def check_parameters(table: tuple[ParameterInfo, ...], values: Mapping[str, float]) -> None:
-    """Refuse values that are not finite or outside the table's range.
-
-    Raises
-    ------
-    ParameterError
-        Naming the parameter, its value, its unit and what is allowed.
-    """
-    for name, info in stored_names(table).items():
-        value = values[name]
-        low = value < info.minimum or (value == info.minimum and not info.minimum_allowed)
-        if not math.isfinite(value) or low or value > info.maximum:
-            bounds = []
-            if info.minimum > -math.inf:
-                bounds.append(f"{'>=' if info.minimum_allowed else '>'} {info.minimum:g}")
-            if info.maximum < math.inf:
-                bounds.append(f"<= {info.maximum:g}")
-            allowed = " and ".join(bounds) or "a finite number"
-            unit = f" {info.unit}" if info.unit not in ("", "1") else ""
-            raise ParameterError(
-                f"parameter {name} = {value:g}{unit}; allowed: {allowed} ({info.meaning})",
-                parameter=name,
-                value=value,
-            )
-
-
-def changed_parameters(
-    mechanism: type[Mechanism], values: Mapping[str, float], changes: Mapping[str, float]
-) -> dict[str, float]:
-    """Apply *changes* to *values* with the uniform-bar rules, and check the result.
-
-    Raises
-    ------
-    ParameterError
-        Unknown name, or a value out of range.
-    """
-    given = expand_names(mechanism.parameter_table, changes)
-    result = {**values, **given}
-    check_parameters(mechanism.parameter_table, result)
-    for rule in mechanism.uniform_rules:
-        moved = any(name in given and given[name] != values[name] for name in rule.when)
-        if not moved or any(name in given for name in rule.unless):
-            continue
-        for name, value in rule.sets.items():
-            if name not in given:
-                result[name] = value(result)
-    check_parameters(mechanism.parameter_table, result)
-    return result

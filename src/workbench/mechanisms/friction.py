@@ -14,7 +14,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.dry_friction import REST_SPEED, at_rest, direction
-from workbench.mechanisms.base import ParameterInfo, Target
+from workbench.mechanisms.parameters import ParameterInfo, Target
 
 SLIDE_DAMPING, HINGE_DAMPING = "N s/m", "N m s/rad"
 NO_FRICTION = "none in the paper"

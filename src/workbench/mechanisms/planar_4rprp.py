@@ -16,8 +16,9 @@ from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.errors import MotionError
 from workbench.mechanisms import planar_4rprp_kernel as kernel
 from workbench.mechanisms import planar_4rprp_screws as screw_route
-from workbench.mechanisms.base import Candidate, Condition, Mechanism, ParameterInfo, Reach, Target, UniformRule
+from workbench.mechanisms.base import Candidate, Condition, Mechanism, Reach
 from workbench.mechanisms.layout import Layout
+from workbench.mechanisms.parameters import ParameterInfo, Target, UniformRule
 from workbench.mechanisms.planar_4rprp_friction import Friction
 from workbench.mechanisms.planar_4rprp_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
 
@@ -250,7 +251,7 @@ class Planar4Rprp(Mechanism):
         kernel.torques_batch(self._constants[mass_model], q, qd, qdd, external_force, tau)
         if not np.isfinite(tau).all():
             self.platform_motion(q, qd, qdd)  # names the sample and the joint
-            bad = ~np.isfinite(tau).all(axis=1)
+            bad = np.asarray(~np.isfinite(tau).all(axis=1))
             self._refuse(bad, "q1, q2, q3", "rates so large that forces overflow", q, "q")
         return tau
 

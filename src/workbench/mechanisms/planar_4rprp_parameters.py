@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from workbench.mechanisms.base import ParameterInfo, Target, UniformRule
 from workbench.mechanisms.friction import (
     HINGE_DAMPING,
     SLIDE_DAMPING,
@@ -14,6 +13,7 @@ from workbench.mechanisms.friction import (
     drive_targets,
 )
 from workbench.mechanisms.layout import BodyInfo, Layout, LoopInfo, X, Y, Z
+from workbench.mechanisms.parameters import ParameterInfo, Target, UniformRule
 
 TABLE_3 = "[GarciaMurillo2016] Table 3"
 EXAMPLE = "[GarciaMurillo2016] section 7"
