@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -222,7 +223,7 @@ class MujocoReference:
         """The result of an empty batch, with the shapes of any other."""
         home = self._closer.home[None, self._structure.actuated_qpos]
         one = self.inverse_dynamics(home, 0 * home, 0 * home, mass_model)
-        arrays = {
+        arrays: dict[str, Any] = {
             field.name: {name: force[:0] for name, force in value.items()} if isinstance(value, dict) else value[:0]
             for field in dataclasses.fields(one)
             for value in [getattr(one, field.name)]

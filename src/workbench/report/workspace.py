@@ -56,7 +56,7 @@ def draw_workspace(directory: Path, paths: Mapping[str, FloatArray] | None = Non
     return written
 
 
-def _looks(count: int) -> list[dict[str, str]]:
+def _looks(count: int) -> list[dict[str, Any]]:
     """Colour and dash of each of *count* lines; dashes tell apart what shares a colour."""
     dashes = ("-", "--", ":", "-.")
     return [{"color": PALETTE[i % len(PALETTE)], "linestyle": dashes[i // len(PALETTE) % 4]} for i in range(count)]
