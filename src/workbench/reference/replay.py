@@ -293,7 +293,7 @@ def _times(first: float, step: float, count: int) -> FloatArray:
 
 
 def near_rigid(text: str, step: float) -> mujoco.MjModel:
-    """Compile an MJCF for forward simulation at a step in seconds, its loops as stiff as the step allows."""
+    """Compile an MJCF for forward simulation at a step in seconds, loops and dry friction as stiff as it allows."""
     spec = mujoco.MjSpec.from_string(text)
     option = spec.option
     option.timestep = step
@@ -308,6 +308,10 @@ def near_rigid(text: str, step: float) -> mujoco.MjModel:
     for equality in spec.equalities:
         equality.solref = [2.0 * step, 1.0]
         equality.solimp = list(LOOP_SOLIMP)
+    # dry friction is a constraint too; with its soft defaults joints would creep
+    for joint in spec.joints:
+        joint.solref_friction = [2.0 * step, 1.0]
+        joint.solimp_friction = list(LOOP_SOLIMP)
     return spec.compile()
 
 
