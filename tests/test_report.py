@@ -36,6 +36,33 @@ PAIRS = [*CANDIDATES.items(), ("lumped", "distributed")]
 BOUND = 1e-10
 NASTY = '<script>alert("1")</script> | *b* _i_ `c` [x](http://evil.example) $a$ \u4e2d\u6587 \U0001f916 \' & # '
 
+REPLAYS = {
+    "reference": ("converges", 0.97, [0.024, 0.012, 0.0061]),
+    "lumped": ("stalls", 0.03, [0.274, 0.262, 0.255]),
+    "distributed": ("undecided", 0.5, [0.02, 0.015, 0.011]),
+}
+EVIDENCE = {
+    "power_balance": {
+        name: {
+            "relative": 1.25e-13, "peak_power_w": 109.5, "worst_time_s": 0.75, "differentiation": 9e-13, "samples": 147,
+        }
+        for name in ("lumped", "distributed")
+    },
+    "second_engine": {"engine": "pinocchio", "spread": {"distributed": dict.fromkeys(JOINTS, 3.5e-14)}},
+    "replay": {
+        "start_s": 0.0, "stop_s": 1.0, "note": "replayed 0 to 1 s",
+        "candidates": {
+            name: {
+                "steps_s": [0.001, 0.0005, 0.00025], "peak_error": [[1e-4, e, 1e-4] for e in errors],
+                "final_error": [[0.0] * 3] * 3, "order": order, "worst_joint": "q2", "limit": errors[-1],
+                "verdict": verdict, "text": f"{verdict} in words",
+            }
+            for name, (verdict, order, errors) in REPLAYS.items()
+        },
+    },
+}  # fmt: skip
+"""What a run writes about the reference itself."""
+
 Edit = Callable[[dict[str, Any], list[dict[str, Any]]], None]
 
 
@@ -133,6 +160,7 @@ def make_run(folder: Path, cases: int = 2, samples: int = 120, edit: Edit | None
                     "note": "",
                 },
             ],
+            "evidence": EVIDENCE,
             "solutions_at_start": [[0.1, 0.2, 0.3], [-0.1, 0.2, 0.3]],
             "warnings": ["det J_q falls to 0.045 at 2.5 s: close to the workspace boundary"] if number else [],
         }
@@ -419,6 +447,50 @@ def test_a_joint_with_another_normaliser_says_so(tmp_path: Path) -> None:
     assert "Normaliser" not in tables["case-sim2-verification"][0]
 
 
+def test_the_budget_shows_what_the_reference_is_worth(run: Path) -> None:
+    tables = parse(run).tables
+    power = tables["case-sim1-budget"]
+    assert power[1][:6] == ["lumped", "1.25e-13", "109.5 W", "0.75 s", "9.00e-13", "147"]
+    assert power[1][6:9] == ["–"] * 3
+    assert power[2][6:9] == ["3.50e-14"] * 3
+    assert power[0][6] == "pinocchio, q1"
+    replays = tables["case-sim1-replay"]
+    assert replays[0][4:7] == ["1 ms", "0.5 ms", "0.25 ms"]
+    assert [row[1] for row in replays[1:]] == ["✓ converges", "→ stalls", "? undecided"]
+    assert replays[2][3:8] == ["q2 [rad]", "0.274", "0.262", "0.255", "0.255"]
+    whole = {row[0]: row[1:3] for row in tables["budget"][1:]}
+    assert whole["Power balance"] == ["1.25e-13 of peak power", "sim1"]
+    assert whole["Second engine"] == ["3.50e-14 of peak torque", "sim1"]
+    assert tables["replay"][1][2] == "→ stalls"
+
+
+def test_undecided_rows_and_contrasts_are_neither_passed_nor_failed(tmp_path: Path) -> None:
+    def doubt(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        without_error_case(manifest, rows)
+        manifest["candidates"]["raw mj_inverse"] = {"mass_model": "distributed"}
+        manifest["status"] = manifest["cases"]["sim2"]["status"] = "failed"
+        for row in rows:
+            row["uncertainty"] = 1e-13
+        rows[17] |= {"verdict": "undecided", "uncertainty": 3e-11}
+        raw = {"candidate": "raw mj_inverse", "kind": "contrast", "bound": "", "verdict": "measured"}
+        rows += [rows[0] | raw | {"joint": joint, "peak_error": 1.0816} for joint in JOINTS]
+
+    folder = make_run(tmp_path / "run", edit=doubt)
+    build_report(folder)
+    status, sentence = verdict(load_run(folder))
+    assert status.key == "undecided"
+    assert sentence.startswith("1 of 24 checks are undecided, because")
+    assert sentence.endswith("(sim2); the other 23 hold their bounds.")
+    tables = parse(folder).tables
+    assert [row[3] for row in tables["case-sim1-contrast"][1:]] == ["108 %"] * 3
+    assert "raw mj_inverse" not in {row[1] for row in tables["case-sim1-modelling"]}
+    heading = tables["case-sim2-verification"][0]
+    assert {row[heading.index("Reference's own")] for row in tables["case-sim2-verification"][1:]} == {
+        "1.00e-13", "3.00e-11",
+    }  # fmt: skip
+    assert {row[0]: row[1] for row in tables["budget"]}["Uncertainty over bound"] == "3.00e-01"
+
+
 def test_numbers_that_are_not_finite_are_words(tmp_path: Path) -> None:
     def edit(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
         # what the run stores as null because JSON has no word for it
@@ -457,7 +529,7 @@ def test_claims_say_in_words_whether_they_hold(run: Path) -> None:
 
 
 def test_sections_stand_in_reading_order(run: Path) -> None:
-    order = ["verdict", "claims", "worst", "cases", "figures", "parameters", "reproduce", "limits"]
+    order = ["verdict", "claims", "worst", "budget", "cases", "figures", "parameters", "reproduce", "limits"]
     found = [attributes["id"] for tag, attributes in parse(run).tags if tag == "section"]
     assert found == order
     titles = re.findall(r"^## (.*)$", (run / "report.md").read_text(encoding="utf-8"), re.MULTILINE)

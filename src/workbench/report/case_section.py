@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 from workbench.metrics import POINTWISE_FLOOR
+from workbench.report.budget import budget_tables
 from workbench.report.curves import Plot
 from workbench.report.evidence import (
     conditions_table,
@@ -18,7 +20,7 @@ from workbench.report.figures import motion_plots, torque_plots
 from workbench.report.load import ErrorRow, Run, Series
 from workbench.report.manifest import CaseRecord
 from workbench.report.tables import CASE_STATUS, KINDS, Cell, Status, Table, columns, verdict_status
-from workbench.report.text import error_fraction, exact, percent, pretty_unit, with_unit
+from workbench.report.text import error_fraction, exact, percent, pretty_unit, scientific, with_unit
 
 ERRORS_DEFINED = (
     "Peak error is max|Δτ| / max|τ_ref|, rms error is rms(Δτ) / rms(τ_ref), both per joint over the whole case, so "
@@ -60,6 +62,7 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None) -> CaseVi
     rows = run.rows_of_case[case]
     tables = [
         *(_error_table(run, case, kind, [row for row in rows if row.kind == kind], anchor) for kind in KINDS),
+        *budget_tables(run, case, anchor),
         evidence_table(record, anchor),
         reactions_table(record, anchor),
         singularity_table(record, anchor),
@@ -112,22 +115,27 @@ SHOWS = {
     "expected-failure": "Declared failures: formulas that are kept wrong on purpose, against the reference.",
     "modelling": "Modelling error: formulas against a reference that assumes something else, its masses for "
     "instance, so that a real difference is expected.",
+    "contrast": "For contrast: MuJoCo's own mj_inverse, which does not project the loops' constraint forces out.",
 }
 READING = {
     "verification": f"These are fractions and should be round-off; a row fails above its bound. {ERRORS_DEFINED}",
     "expected-failure": f"A declared failure has to exceed its bound, every other row has to keep it. {ERRORS_DEFINED}",
     "modelling": "A measured result without a bound, in percent of the reference's own peak, or rms, on that joint; "
     f"the pointwise error leaves out samples below {100 * POINTWISE_FLOOR:g} % of that peak; “left out” counts them.",
+    "contrast": "Nothing judges these rows: they show why the reference projects. In percent of the reference's own "
+    "peak, or rms, on that joint.",
 }
 
 
 def _error_table(run: Run, case: str, kind: str, rows: list[ErrorRow], anchor: str) -> Table:
-    bounded = kind != "modelling"
+    bounded = kind in ("verification", "expected-failure")
+    doubted = bounded and any(not math.isnan(row.uncertainty) for row in rows)
     scaled = any(row.normaliser != row.peak_reference for row in rows)
     samples = run.manifest.cases[case].samples
     number = error_fraction if bounded else percent
     names = ["Joint", "Candidate", "Reference", "Peak error", "Rms error", "Pointwise error", "Left out", "Worst at"]
-    names += ["Peak of reference", *(["Normaliser"] if scaled else []), *(["Bound"] if bounded else []), "Verdict"]
+    names += ["Peak of reference", *(["Normaliser"] if scaled else []), *(["Bound"] if bounded else [])]
+    names += [*(["Reference's own"] if doubted else []), "Verdict"]
     body = []
     for row in rows:
         total = f" of {samples}" if samples is not None else ""
@@ -146,12 +154,16 @@ def _error_table(run: Run, case: str, kind: str, rows: list[ErrorRow], anchor: s
             cells.append(Cell(with_unit(exact(row.normaliser), row.unit), row.normaliser))
         if bounded:
             cells.append(Cell(exact(row.bound), row.bound))
+        if doubted:
+            cells.append(Cell(scientific(row.uncertainty), row.uncertainty))
         body.append((*cells, Cell(status=verdict_status(row.verdict))))
     reading = READING[kind]
     if scaled:
         reading += (
             " A joint that carries next to nothing is judged by the column “Normaliser” in place of its own peak."
         )
+    if doubted:
+        reading += " “Reference's own” is the reference's own uncertainty; a verdict counts where it is below a tenth."
     return Table(f"{anchor}-{kind}", SHOWS[kind], columns(names, numeric=names[3:-1]), tuple(body), reading)
 
 

@@ -44,6 +44,8 @@ class ErrorRow:
     pointwise_skipped: int
     normaliser: float
     """what turns the largest difference into `peak_error`: the reference's peak, unless the run says otherwise"""
+    uncertainty: float = math.nan
+    """of the reference itself, relative; NaN where nobody looked"""
 
     @property
     def badness(self) -> float:
@@ -203,6 +205,7 @@ def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
         unit=record["unit"],
         pointwise_skipped=int(number("pointwise_skipped")),
         normaliser=number("normaliser" if record.get("normaliser") else "peak_reference"),
+        uncertainty=number("uncertainty") if record.get("uncertainty", "").strip() else math.nan,
     )
 
 

@@ -106,6 +106,56 @@ class ConditionRecord(Record):
     note: str = ""
 
 
+class PowerRecord(Record):
+    """Power balance of the reference under one mass model."""
+
+    relative: float | None = None
+    """largest residual over peak power"""
+    peak_power_w: float | None = None
+    worst_time_s: float | None = None
+    differentiation: float | None = None
+    """how well the energy's derivative is known, over peak power"""
+    samples: int | None = None
+
+
+class EngineRecord(Record):
+    """A second engine against the reference: mass model -> joint -> peak error."""
+
+    engine: str
+    spread: dict[str, dict[str, float | None]] = {}
+
+
+class ReplayRecord(Record):
+    """Forward simulation with one candidate's torques, at several time steps."""
+
+    steps_s: tuple[float | None, ...] = ()
+    peak_error: tuple[tuple[float | None, ...], ...] = ()
+    """``(steps, joints)``, in the coordinates' units"""
+    order: float | None = None
+    worst_joint: str = ""
+    limit: float | None = None
+    """extrapolated to a step of zero, on the worst joint"""
+    verdict: str = ""
+    text: str = ""
+
+
+class ReplaySetRecord(Record):
+    """All replays of a case."""
+
+    start_s: float | None = None
+    stop_s: float | None = None
+    note: str = ""
+    candidates: dict[str, ReplayRecord] = {}
+
+
+class EvidenceRecord(Record):
+    """What the reference itself is worth in one case."""
+
+    power_balance: dict[str, PowerRecord] = {}
+    second_engine: EngineRecord | None = None
+    replay: ReplaySetRecord | None = None
+
+
 class CaseRecord(Record):
     """One case: its status and the scalar evidence about mechanism and reference. Missing evidence is None."""
 
@@ -135,6 +185,7 @@ class CaseRecord(Record):
     peak_reactions: dict[str, float | None] = {}
     conditions: tuple[ConditionRecord, ...] = ()
     solutions_at_start: tuple[tuple[float | None, ...], ...] = ()
+    evidence: EvidenceRecord = EvidenceRecord()
     warnings: tuple[str, ...] = ()
 
 
@@ -157,6 +208,9 @@ class Manifest(Record):
     versions: dict[str, str] = {}
     machine: dict[str, Any] = {}
     git_commit: str | None = None
+    engines: tuple[str, ...] = ()
+    budget: bool | None = None
+    """whether the evidence about the reference was gathered; None where the run does not say"""
     command: str = ""
     started: str = ""
     finished: str = ""

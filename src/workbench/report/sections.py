@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from workbench.report.budget import budget_section
 from workbench.report.campaign_figures import campaign_plot, error_over_plot
 from workbench.report.case_section import CaseView, case_view
 from workbench.report.curves import Plot
@@ -15,7 +16,7 @@ from workbench.report.error_sections import claims_section, worst_section
 from workbench.report.load import Run, Series
 from workbench.report.manifest import FigureRecord
 from workbench.report.section import Section
-from workbench.report.tables import CASE_STATUS, Cell, Table, columns
+from workbench.report.tables import CASE_STATUS, CHECKED, Cell, Table, columns
 from workbench.report.text import error_fraction, exact, pretty_unit, scientific, slug
 from workbench.report.verdict_section import verdict_section
 
@@ -61,6 +62,7 @@ def build_sections(run: Run) -> list[Section]:
         verdict_section(run),
         claims_section(run),
         worst_section(run, anchors),
+        budget_section(run, anchors),
         cases_section(run, views),
         figures_section(run, drawn, anchors),
         parameters_section(run),
@@ -91,7 +93,7 @@ def cases_section(run: Run, views: list[CaseView]) -> Section:
     """List the cases and then show each."""
     rows = []
     for view in views:
-        checked = [row for row in run.rows_of_case[view.name] if row.verdict in ("pass", "fail")]
+        checked = [row for row in run.rows_of_case[view.name] if row.verdict in CHECKED]
         worst = max(checked, key=lambda row: row.badness) if checked else None
         rows.append(
             (
@@ -171,6 +173,7 @@ def reproduce_section(run: Run) -> Section:
         ("Model SHA-256", manifest.model.sha256),
         ("Mechanism", manifest.model.mechanism),
         ("Git commit", manifest.git_commit or "not a git checkout"),
+        *([("Engines", ", ".join(manifest.engines))] if manifest.engines else []),
         ("Started", manifest.started),
         ("Finished", manifest.finished),
         ("Run time", "–" if manifest.seconds is None else f"{manifest.seconds:.1f} s"),

@@ -41,7 +41,9 @@ VERDICT_STATUS = {
 }
 FAILURES = frozenset({"fail", "unexpected-pass", "undecided"})
 """Verdicts that fail a campaign."""
-KINDS = ("verification", "expected-failure", "modelling")
+CHECKED = frozenset({"pass", "fail", "undecided"})
+"""Verdicts of rows that have a bound to keep."""
+KINDS = ("verification", "expected-failure", "modelling", "contrast")
 """Families of rows, which a table never mixes."""
 
 CLAIM_STATUS = {True: HOLDS, False: REFUTED, None: UNDECIDED}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from workbench.report.load import Run
 from workbench.report.section import Section
 from workbench.report.tables import (
+    CHECKED,
     ERROR_VERDICT,
     FAILED,
     FAILURES,
@@ -48,8 +49,9 @@ def verdict_section(run: Run) -> Section:
 def verdict(run: Run) -> tuple[Status, str]:
     """Return the overall status and the sentence; a failed row or case is never hidden by the manifest's own status."""
     cases = run.manifest.cases
-    checks = [row for row in run.rows if row.verdict in ("pass", "fail")]
+    checks = [row for row in run.rows if row.verdict in CHECKED]
     failed = [row for row in checks if row.verdict == "fail"]
+    undecided = [row for row in run.rows if row.verdict == "undecided"]
     declared = [row for row in run.rows if row.verdict in ("expected-fail", "unexpected-pass")]
     unseen = [row for row in declared if row.verdict == "unexpected-pass"]
     broken = [name for name, record in cases.items() if record.status == "error"]
@@ -68,14 +70,22 @@ def verdict(run: Run) -> tuple[Status, str]:
     bad = []
     if failed:
         bad.append(f"{len(failed)} of {len(checks)} checks exceed their bound ({where})")
+    if undecided:
+        bad.append(
+            f"{len(undecided)} of {len(checks)} checks are undecided, because the reference's own uncertainty is not "
+            f"below a tenth of the bound ({', '.join(dict.fromkeys(row.case for row in undecided))})"
+        )
     if unseen:
         bad.append(f"{len(unseen)} of {len(declared)} declared failures did not happen")
     if other:
         bad.append(f"{_cases(len(other))} failed for another reason ({', '.join(other)})")
     if broken:
         bad.append(f"{len(broken)} of {_cases(len(cases))} could not be computed ({', '.join(broken)})")
-    if failed or unseen or other or run.manifest.status == "failed":
+    if failed or unseen or other or (run.manifest.status == "failed" and not undecided):
         return FAILED, f"{', and '.join(bad) or 'the run says so, though no row of it does'}."
+    if undecided:
+        held = f"; the other {len(checks) - len(undecided)} hold their bounds" if len(checks) > len(undecided) else ""
+        return UNDECIDED_VERDICT, f"{', and '.join(bad)}{held}."
     if broken or run.manifest.status == "error":
         held = f"; the {len(checks)} checks that were made hold their bounds" if checks else ""
         return ERROR_VERDICT, f"{', and '.join(bad) or 'the run ended in an error'}{held}."
