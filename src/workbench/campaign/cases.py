@@ -188,6 +188,9 @@ def _in_case(error: WorkbenchError, file: Path, case: str) -> WorkbenchError:
 
 
 def _resolve(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float], mechanism: Mechanism) -> Case:
+    for joint in spec.bounds:
+        if joint not in mechanism.joints:
+            raise SpecError(f'bounds: no joint "{joint}"{did_you_mean(joint, mechanism.joints)}')
     planned = plan_motion(spec, file, mechanism)
     if len(planned.t) > MAX_SAMPLES:
         raise MotionError(f"motion: {len(planned.t)} samples; allowed: at most {MAX_SAMPLES}", value=len(planned.t))

@@ -133,6 +133,7 @@ def _rows(
     for i, joint in enumerate(case.mechanism.joints):
         error = joint_error(tau[:, i], reference.tau[:, i], reaction)
         uncertainty = evidence.uncertainty(candidate.reference, joint)
+        judged = candidate.in_case(case.spec, joint)
         rows.append(
             Row(
                 case=case.name,
@@ -143,8 +144,8 @@ def _rows(
                 rms_error=error.rms_error,
                 pointwise_error=error.pointwise_error,
                 worst_time_s=float(case.motion.t[error.worst_index]),
-                bound=candidate.bound,
-                verdict=verdict_of(candidate, case.name, joint, error.peak_error, uncertainty),
+                bound=judged.bound,
+                verdict=verdict_of(judged, case.name, joint, error.peak_error, uncertainty),
                 kind=kind_of(candidate),
                 unit=case.mechanism.force_units[i],
                 peak_reference=error.peak_reference,

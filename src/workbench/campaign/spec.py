@@ -109,6 +109,12 @@ class CandidateSpec(Strict):
             raise ValueError("expect_fail needs a bound that can fail")
         return self
 
+    def in_case(self, case: CaseSpec, joint: str) -> CandidateSpec:
+        """Return the candidate with the bound that holds for a joint of a case."""
+        if self.bound is None or joint not in case.bounds:
+            return self
+        return self.model_copy(update={"bound": case.bounds[joint]})
+
 
 class ReplayWindow(Strict):
     """Seconds from start to stop over which torques drive the model; the motion may be defined beyond its samples."""
@@ -126,6 +132,8 @@ class CaseSpec(Strict):
     motion: Motion
     parameters: dict[str, Finite] = Field(default_factory=dict)
     external_force: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    bounds: dict[str, Annotated[Finite, Field(gt=0)]] = Field(default_factory=dict)
+    """by joint: a bound in place of the candidates', where the reference itself is worth less on this case"""
     replay: ReplayWindow | None = None
     """window of the forward replay; None is the case's own samples"""
 
