@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 
 import workbench as wb
 from small_campaign import CANDIDATES, HEAD, SMALL, Workbench, listing
+from workbench import console
 from workbench.campaign import store
 from workbench.campaign.unloaded import UNLOADED, joint_error, largest_reaction
 
@@ -206,6 +208,23 @@ def test_a_claim_that_does_not_hold_is_printed_and_fails_nothing(workbench: Work
     assert done.code == 0
     assert "1 confirmed, 1 not confirmed." in done.out
     assert "not confirmed: the platform reaches 9.0 m/s: measured " in done.out
+
+
+# --- the terminal ---
+
+
+@pytest.mark.parametrize(("columns", "beside"), [(80, False), (120, True)])
+def test_the_table_fits_the_terminal(
+    workbench: Workbench, monkeypatch: pytest.MonkeyPatch, columns: int, beside: bool
+) -> None:
+    monkeypatch.setattr(console, "out", Console(width=columns, highlight=False))
+    text = SMALL.replace('"first"', '"longer_than_most"').replace('"distributed"\n', '"distributed-rotation"\n', 1)
+    done = workbench.run(text.replace('reference = "distributed-rotation"', 'reference = "distributed"'))
+    assert done.code == 0, done
+    table = done.out.split("Modelling")[0].splitlines()
+    assert max(len(line) for line in table) <= columns
+    names = [line for line in table if "longer_than_most" in line]
+    assert [len(line.split()) > 1 for line in names] == [beside]
 
 
 # --- joints that carry nothing ---

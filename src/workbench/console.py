@@ -124,9 +124,8 @@ def _verdict(outcome: Outcome) -> Text:
     )
     if outcome.passed:
         worst = max((row.peak_error for row in outcome.rows if row.verdict == PASS), default=math.nan)
-        parts = (
-            [f"{checks} checks in {len(cases)} cases within their bounds; largest error {worst:.2g}"] if checks else []
-        )
+        within = f"{checks} checks in {len(cases)} {'case' if len(cases) == 1 else 'cases'} within their bounds"
+        parts = [f"{within}; largest error {worst:.2g}"] if checks else []
         parts += [f"{declared} declared failures seen"] if declared else []
         return Text(f"PASSED: {'; '.join(parts) or 'nothing to judge'}.", style="bold green")
     parts = [f"{verdicts[FAIL]} of {checks} checks beyond their bounds"] if verdicts[FAIL] else []
@@ -141,11 +140,21 @@ def _verdict(outcome: Outcome) -> Text:
 
 
 def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any) -> Table:
+    """One line per case and candidate; where that is wider than the terminal, cases stand on lines of their own."""
+    names = tuple(joints)
+    beside = _laid_out(title, rows, names, show, case_above=False)
+    unbounded = out.options.update(max_width=1000)
+    if out.measure(beside, options=unbounded).maximum <= out.width:
+        return beside
+    return _laid_out(title, rows, names, show, case_above=True)
+
+
+def _laid_out(title: str, rows: list[Row], joints: Iterable[str], show: Any, *, case_above: bool) -> Table:
     bounds = {row.bound for row in rows if row.bound is not None}
     if len(bounds) == 1:
         title += f"; bound {next(iter(bounds)):.0e}"
     table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ("case", "candidate", "MuJoCo model"):
+    for column in (["candidate"] if case_above else ["case", "candidate"]) + ["MuJoCo model"]:
         table.add_column(column, overflow="fold")
     for joint in joints:
         table.add_column(joint, justify="right", no_wrap=True)
@@ -158,7 +167,11 @@ def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any) -> Tab
     previous = ""
     for (case, candidate, reference), members in groups.items():
         verdict = next(v for v in STYLES if any(r.verdict == v for r in members))
-        cells = [Text(case if case != previous else ""), Text(candidate), Text(reference)]
+        cells = [Text(f"  {candidate}" if case_above else candidate), Text(reference)]
+        if not case_above:
+            cells.insert(0, Text(case if case != previous else ""))
+        elif case != previous:
+            table.add_row(Text(case))
         cells += [Text(show(r.peak_error), style="red" if r.verdict in FAILURES else "") for r in members]
         if len(bounds) > 1:
             cells.append(Text("" if members[0].bound is None else f"{members[0].bound:.0e}"))
