@@ -155,7 +155,9 @@ def disagreement(path: Path, against: Path | None = None) -> float:
     return max(errors)
 
 
-@pytest.mark.parametrize("edit", [e for e in HAND_EDITS if e.refused is None], ids=lambda e: f"{e.model.stem[:4]}-{e.name}")
+@pytest.mark.parametrize(
+    "edit", [e for e in HAND_EDITS if e.refused is None], ids=lambda e: f"{e.model.stem[:4]}-{e.name}"
+)
 def test_hand_edits_that_are_handled(edit: HandEdit, tmp_path: Path) -> None:
     path = edit.write(tmp_path)
     assert disagreement(path) <= VERIFIED
@@ -202,7 +204,17 @@ def test_the_bundled_models_keep_every_assumption(model: Path) -> None:
     assumptions = check_assumptions(open_model(model))
     assert [a.message for a in assumptions if not a.ok] == []
     assert len(assumptions) > 100
-    for kind in ("joint axis", "joint type", "loop", "orientation", "gear", "number", "left out", "option", "custom name"):
+    for kind in (
+        "joint axis",
+        "joint type",
+        "loop",
+        "orientation",
+        "gear",
+        "number",
+        "left out",
+        "option",
+        "custom name",
+    ):
         assert any(a.name == kind for a in assumptions), kind
     assert all(a.where and a.value and a.limit for a in assumptions)
 
@@ -281,24 +293,3 @@ def test_check_reports_open_loops_and_the_engines_warnings(tmp_path: Path) -> No
     assert any('site "parallelogram_bar_2_tip" pos is 5;' in line for line in found.broken)
     path.write_text(ASYM.read_text().replace('timestep="0.0005"', 'timestep="0.5"'))
     assert any("bad" in line or "unstable" in line for line in check_model(path).warnings)
-
-
-@BOTH
-def test_loading_stays_fast_enough_for_sweeps(model: Path) -> None:
-    """Ten thousand loads may not take a minute; measured against compiling alone, so that slow machines pass too."""
-    from time import perf_counter
-
-    from workbench.mjcf import compile_text
-
-    text = model.read_text()
-
-    def best(function: object) -> float:
-        times = []
-        for _ in range(7):
-            start = perf_counter()
-            function()  # type: ignore[operator]
-            times.append(perf_counter() - start)
-        return min(times)
-
-    load_model(model, {"g": 9.0})
-    assert best(lambda: load_model(model, {"g": 9.1})) < 10 * best(lambda: compile_text(text, "m"))

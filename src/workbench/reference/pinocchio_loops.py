@@ -57,7 +57,6 @@ class PinocchioLoops:
         self.data = self.model.createData()
         self.structure = structure
         self._reading = reading
-        self._reference = np.array(compiled.qpos0)[compiled.jnt_qposadr]
         owner = {int(compiled.jnt_dofadr[j]): place for j, place in enumerate(reading.joints)}
         self.actuated = np.array([self.model.idx_vs[owner[int(d)]] for d in structure.actuated])
         self.actuated_q = np.array([self.model.idx_qs[owner[int(d)]] for d in structure.actuated])
@@ -116,16 +115,16 @@ class PinocchioLoops:
         return rod
 
     def _joint_row(self, q: FloatArray, one: int, two: int, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """MuJoCo's joint equality: both coordinates count from their reference values."""
+        """Joint equality; the structure's polynomial is already one of the coordinates themselves."""
         first = self._reading.joints[one]
         row = np.zeros((1, self.model.nv))
         row[0, self.model.idx_vs[first]] = 1.0
         y = 0.0
         if two >= 0:
             second = self._reading.joints[two]
-            y = q[self.model.idx_qs[second]] - self._reference[two]
+            y = q[self.model.idx_qs[second]]
             row[0, self.model.idx_vs[second]] = -np.polynomial.polynomial.polyval(y, c[1:] * np.arange(1, 5))
-        value = q[self.model.idx_qs[first]] - self._reference[one] - np.polynomial.polynomial.polyval(y, c)
+        value = q[self.model.idx_qs[first]] - np.polynomial.polynomial.polyval(y, c)
         return row, np.array([value])
 
     def drift(self, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -143,7 +142,7 @@ class PinocchioLoops:
                 bend = 0.0
                 if two >= 0:
                     place = self._reading.joints[two]
-                    y = q[model.idx_qs[place]] - self._reference[two]
+                    y = q[model.idx_qs[place]]
                     curve = c[2:] * np.array([2.0, 6.0, 12.0])
                     bend = np.polynomial.polynomial.polyval(y, curve) * v[model.idx_vs[place]] ** 2
                 out.append(np.array([-bend]))
