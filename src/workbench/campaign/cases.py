@@ -203,9 +203,15 @@ def _resolve(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float
         x, xd, xdd = mechanism.platform_motion(motion.q, motion.qd, motion.qdd)
         mechanism.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
     except MotionError as error:
-        raise at_time(error, planned.t) from error
+        raise with_unit_hint(at_time(error, planned.t), mechanism) from error
     force = np.tile(np.array(spec.external_force), (len(motion.t), 1))
     return Case(spec, model, overrides, mechanism, motion, force, x, xd, xdd)
+
+
+def with_unit_hint(error: WorkbenchError, mechanism: Mechanism) -> WorkbenchError:
+    """Add to an error that lengths look like millimetres, where they do: then that is what is wrong."""
+    hints = mechanism.millimetre_warnings()
+    return type(error)(f"{error}; {hints[0]}", **error.facts) if hints else error
 
 
 def at_time(error: MotionError, t: FloatArray) -> MotionError:

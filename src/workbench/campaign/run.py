@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.campaign import provenance, store
-from workbench.campaign.cases import Case, resolve_cases
+from workbench.campaign.cases import Case, resolve_cases, with_unit_hint
 from workbench.campaign.claims import judge_claims
 from workbench.campaign.compare import RAW_DESCRIPTION, RAW_INVERSE, CaseResult, Row, compute_case
 from workbench.campaign.cost import cost_us
@@ -114,8 +114,9 @@ def run_campaign(
 def _compute(campaign: Campaign, case: Case, file: Path, effort: Effort) -> CaseResult:
     try:
         return compute_case(campaign, case, effort)
-    except WorkbenchError as error:
-        raise type(error)(f'{file}: case "{case.name}": {error}', **{**error.facts, "case": case.name}) from error
+    except WorkbenchError as found:
+        error = with_unit_hint(found, case.mechanism)
+        raise type(error)(f'{file}: case "{case.name}": {error}', **{**error.facts, "case": case.name}) from found
 
 
 def _shown(path: Path, campaign_file: Path) -> str:

@@ -197,14 +197,16 @@ class Mechanism(ABC):
                     f"close to a singular pose at t = {t[worst]:.6g} s: |{name}| falls to {abs(values[worst]):.3g} of"
                     f" its scale (warning below {NEAR_SINGULAR:g})"
                 )
-        for name, info in stored_names(self.parameter_table).items():
-            value = getattr(self._parameters, name)
-            if info.unit == "m" and abs(value) > LONGEST_LINK:
-                found.append(
-                    f"{name} = {value:g} m is longer than {LONGEST_LINK:g} m: lengths are in metres, this looks like"
-                    " millimetres"
-                )
-        return found
+        return found + self.millimetre_warnings()
+
+    def millimetre_warnings(self) -> list[str]:
+        """Lengths that were most likely written in millimetres."""
+        return [
+            f"{name} = {value:g} m is longer than {LONGEST_LINK:g} m: lengths are in metres, this looks like"
+            " millimetres"
+            for name, info in stored_names(self.parameter_table).items()
+            if info.unit == "m" and abs(value := getattr(self._parameters, name)) > LONGEST_LINK
+        ]
 
     def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
         """What the actuators must supply for friction and rotor inertia, ``(n, na)``; `torques` leaves it out."""
