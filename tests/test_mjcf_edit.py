@@ -18,9 +18,10 @@ from hypothesis import strategies as st
 from robots import peak_error
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, OutputError, ParameterError, WorkbenchError
+from workbench.mechanisms.assignments import parse_assignment, resolve_changes
 from workbench.mechanisms.parameters import stored_names
 from workbench.mjcf import LoadedModel, load_model
-from workbench.mjcf_edit import edit_file, parse_assignment, resolve_changes, resolve_for
+from workbench.mjcf_edit import edit_file, resolve_for
 from workbench.mjcf_show import show_parameters
 from workbench.mjcf_text import find, scan, tokens
 from workbench.mjcf_values import precise, quotient
@@ -349,3 +350,40 @@ def test_show_lists_every_parameter_where_it_stands(model: Path) -> None:
         # the row's own rule, worked out with the row's own values, is the number that stands there
         product = eval(row.rule, {}, dict(loaded.values))
         assert written == pytest.approx(product, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("model", "changes", "expected"),
+    [
+        (ASYM, {"m2": 1e-5}, r"parameter I2_left = 7.5e-08 kg m\^2 \(with m2_left = 1e-05, .*body \"rod_left\""),
+        (ASYM, {"a1": 0.001}, r"parameter I1_left = .*body \"arm_left\" .*each at most the sum of the other two"),
+        (ASYM, {"I5": 1e-9}, r"parameter I5 = 1e-09 kg m\^2: body \"parallelogram_bar_1\""),
+        (PLANAR, {"I2x": 1e-9}, r"parameter I2x = 1e-09 kg m\^2: body \"cylinder_1\" .* 1e-09, 6.056e-05, 1e-09"),
+        (ASYM, {"m4": 1e-20}, r"parameter m4 = 1e-20 kg: body \"slider\" .* at least 1e-15"),
+        (ASYM, {"m2": 1e5, "a2": 1e5}, r"parameter I2_left = 8.3\d*e\+13 kg m\^2; .* at most 1e\+10"),
+        (ASYM, {"a2": 1e300}, r"parameter a2_left = 1e\+300 m; .* at most 1e\+10"),
+        (ASYM, {"a2": 10**400}, r"parameter a2_left = inf m"),
+    ],
+)
+def test_bodies_that_cannot_be_name_the_parameter(
+    model: Path, changes: dict[str, float], expected: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ParameterError, match=expected):
+        load_model(model, changes)
+    if max(changes.values()) < 1e300:
+        with pytest.raises(ParameterError, match=expected):
+            edit_file(model, [f"{n}={v!r}" for n, v in changes.items()], tmp_path / "edited.xml")
+        assert not list(tmp_path.iterdir())
+
+
+def test_bodies_at_the_limit_are_possible() -> None:
+    """Twin: the least transverse inertia beside an axial one of 1e-6 kg m^2, and a payload that does not move alone."""
+    assert load_model(ASYM, {"I2": 5e-7, "payload": 0.0}).values["I2_left"] == 5e-7
+    with pytest.raises(ParameterError, match="each at most"):
+        load_model(ASYM, {"I2": math.nextafter(5e-7, 0)})
+
+
+def test_huge_values_are_refused_by_the_closed_form_too() -> None:
+    for value in (1e300, -1e300, 10**400):
+        with pytest.raises(ParameterError, match=r"parameter g = .*at most 1e"):
+            load_mechanism(ASYM).with_parameters(g=value)

@@ -66,7 +66,7 @@ def run(
     only: Annotated[list[str] | None, typer.Option(metavar="CASE", help="Run this case only; may be repeated.")] = None,
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI units; may be repeated."),
+        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI; a2*=1.1 scales."),
     ] = None,
     model: Annotated[
         Path | None, typer.Option(metavar="FILE", help="MJCF file in place of the campaign's own.")
@@ -87,13 +87,15 @@ def run(
     from workbench.console import CaseProgress, print_outcome
     from workbench.report import build_report
 
+    values, relative = settings(set_ or [])
     with CaseProgress() as progress:
         outcome = run_campaign(
             campaign,
             out,
             model=model,
             only=only or (),
-            settings=settings(set_ or []),
+            settings=values,
+            relative=relative,
             command=["workbench", *sys.argv[1:]],
             progress=progress,
             report=build_report,

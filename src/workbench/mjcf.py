@@ -19,8 +19,9 @@ from workbench.data_files import bundled
 from workbench.errors import ModelError, ParameterError, WorkbenchError, did_you_mean
 from workbench.mechanisms import MECHANISMS, mechanism_class
 from workbench.mechanisms.base import Mechanism
-from workbench.mechanisms.parameters import changed_parameters
+from workbench.mechanisms.parameters import LARGEST_NUMBER, changed_parameters
 from workbench.mjcf_assumptions import Context, refuse_broken
+from workbench.mjcf_inertia import refuse_impossible_bodies
 from workbench.mjcf_safety import MAX_BYTES, read_text
 from workbench.mjcf_text import Element, scan
 from workbench.mjcf_values import read_parameters, rewrite
@@ -39,9 +40,6 @@ __all__ = [
     "read_parameters",
     "read_text",
 ]
-
-LARGEST_NUMBER = 1e10
-"""MuJoCo's own bound on positions and velocities; beyond it a simulation counts as diverged."""
 
 FINITE = (
     "qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
@@ -165,8 +163,8 @@ def load_model(path: str | Path, overrides: Mapping[str, float] | None = None) -
             f'{file}: parameters cannot be set, <custom> has no <text name="mechanism"> that says what they mean',
             file=file,
         )
-    refuse_huge(overrides)
     wanted = changed_parameters(base.kind, base.values, overrides)
+    refuse_impossible_bodies(base.model, base.kind, file, base.values, wanted)
     loaded = load_text(rewrite(text, file, base.kind, base.values, wanted, base.elements), file)
     confirm(loaded, wanted)
     return loaded
@@ -241,19 +239,6 @@ def edit_text(
     return rewrite(text, file, mechanism, values, changed_parameters(mechanism, values, changes))
 
 
-def refuse_huge(values: Mapping[str, float]) -> None:
-    """Refuse numbers that MuJoCo does not hold, before anything is computed from them.
-
-    Raises
-    ------
-    ParameterError
-        A magnitude above `LARGEST_NUMBER`. What is no number at all is left to the parameter table.
-    """
-    for name, value in values.items():
-        if isinstance(value, int | float) and abs(value) > LARGEST_NUMBER and abs(value) < float("inf"):
-            raise ParameterError(f"parameter {name} = {value:g}; allowed: at most {LARGEST_NUMBER:g}", parameter=name)
-
-
 def confirm(loaded: LoadedModel, wanted: Mapping[str, float]) -> None:
     """Refuse an edited model that does not give back, bit for bit, the parameters that were asked for.
 
@@ -276,6 +261,7 @@ def confirm(loaded: LoadedModel, wanted: Mapping[str, float]) -> None:
 
 @dataclass(frozen=True)
 class _Read:
+    model: mujoco.MjModel
     kind: type[Mechanism] | None
     values: Mapping[str, float] | None
     elements: list[Element]
@@ -285,7 +271,7 @@ class _Read:
 def _read_once(text: str, file: str) -> _Read:
     """What a sweep over one file needs of it again and again."""
     loaded = load_text(text, file)
-    return _Read(loaded.kind, loaded.values, scan(text, file))
+    return _Read(loaded.model, loaded.kind, loaded.values, scan(text, file))
 
 
 def load_text(text: str, file: str) -> LoadedModel:

@@ -4,37 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import stat
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.errors import ModelError, OutputError, ParameterError
-from workbench.mechanisms.base import Mechanism
-from workbench.mechanisms.parameters import changed_parameters, expand_names, stored_names
-from workbench.mjcf import LoadedModel, confirm, find_model, load_model, load_text, refuse_huge
+from workbench.mechanisms.assignments import parse_assignment, resolve_changes
+from workbench.mechanisms.parameters import changed_parameters, stored_names
+from workbench.mjcf import LoadedModel, confirm, find_model, load_model, load_text
+from workbench.mjcf_inertia import refuse_impossible_bodies
 from workbench.mjcf_values import rewrite
-
-ASSIGNMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*([*/+-]?=)\s*(\S+)\s*")
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-OPERATIONS = {
-    "=": lambda old, number: number,
-    "*=": lambda old, number: old * number,
-    "/=": lambda old, number: old / number,
-    "+=": lambda old, number: old + number,
-    "-=": lambda old, number: old - number,
-}
-
-
-@dataclass(frozen=True)
-class Assignment:
-    """One change as a user writes it: ``a2=0.31``, ``a2_left*=1.1``."""
-
-    name: str
-    operator: str
-    number: float
 
 
 @dataclass(frozen=True)
@@ -56,59 +37,6 @@ class EditResult:
     changes: tuple[Change, ...]
     lines: tuple[int, ...]
     """numbers of the lines that changed, from 1"""
-
-
-def parse_assignment(text: str) -> Assignment:
-    """Read ``NAME=VALUE``, ``NAME*=FACTOR``, and the like with ``/=``, ``+=``, ``-=``.
-
-    Raises
-    ------
-    ParameterError
-        One line that says what is wrong and what is allowed.
-    """
-    match = ASSIGNMENT.fullmatch(text)
-    if match is None:
-        raise ParameterError(f'"{text}" is no change of a parameter; allowed: NAME=VALUE, NAME*=FACTOR, /=, +=, -=')
-    name, operator, value = match.groups()
-    number = float(value) if NUMBER.fullmatch(value) else float("nan")
-    if not abs(number) < float("inf"):
-        raise ParameterError(f'parameter {name}: "{value}" is not a finite number, SI without unit', parameter=name)
-    if operator == "/=" and number == 0:
-        raise ParameterError(f"parameter {name}: {text.strip()} divides by zero", parameter=name)
-    return Assignment(name, operator, number)
-
-
-def resolve_changes(
-    mechanism: type[Mechanism], values: Mapping[str, float], changes: Sequence[str]
-) -> dict[str, float]:
-    """Turn changes as a user writes them into new values by stored name (``a2_left``).
-
-    Parameters
-    ----------
-    mechanism, values
-        What the model describes, and its parameters as they stand.
-    changes
-        Each as for `parse_assignment`. ``NAME`` of a sided parameter changes both limbs, each from its own value; where
-        ``NAME_left`` or ``NAME_right`` is given too, that limb follows it.
-
-    Raises
-    ------
-    ParameterError
-        Unknown name, the same name twice, or not a change.
-    """
-    stored = stored_names(mechanism.parameter_table)
-    parsed = [parse_assignment(text) for text in changes]
-    seen: set[str] = set()
-    result: dict[str, float] = {}
-    for change in sorted(parsed, key=lambda c: c.name in stored):
-        if change.name in seen:
-            raise ParameterError(f"parameter {change.name} is given twice", parameter=change.name)
-        seen.add(change.name)
-        names = expand_names(mechanism.parameter_table, {change.name: 0.0})
-        for name in names:
-            result[name] = OPERATIONS[change.operator](values[name], change.number) + 0.0
-    refuse_huge(result)
-    return result
 
 
 def resolve_for(path: str | Path, changes: Sequence[str]) -> dict[str, float]:
@@ -178,6 +106,7 @@ def edit_file(
     assert loaded.values is not None
     given = resolve_changes(loaded.kind, loaded.values, changes)
     wanted = changed_parameters(loaded.kind, loaded.values, given)
+    refuse_impossible_bodies(loaded.model, loaded.kind, loaded.file, loaded.values, wanted)
     text = rewrite(loaded.text, loaded.file, loaded.kind, loaded.values, wanted)
     confirm(load_text(text, loaded.file), wanted)
     _write(target, text, source)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from workbench.campaign.spec import (
 )
 from workbench.data_files import bundled, bundled_names
 from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
+from workbench.mechanisms.assignments import resolve_changes
 from workbench.mechanisms.base import Mechanism
 from workbench.mechanisms.parameters import SIDES
 from workbench.mjcf import load_model
@@ -64,6 +66,7 @@ def resolve_cases(
     model: Path | None = None,
     only: tuple[str, ...] = (),
     settings: Mapping[str, float] | None = None,
+    relative: Sequence[str] = (),
 ) -> list[Case]:
     """Resolve every case: parameters (campaign, case, command line), model, motion, candidates.
 
@@ -77,6 +80,8 @@ def resolve_cases(
         Names of the cases wanted; empty is all.
     settings
         Parameters from the command line; they go over all others.
+    relative
+        Changes like ``a2*=1.1``, each from what the parameter then is in the case.
 
     Raises
     ------
@@ -89,17 +94,26 @@ def resolve_cases(
         if name not in names:
             raise SpecError(f'{file}: no case "{name}"{did_you_mean(name, names)}', file=str(file), case=name)
     loaded: dict[tuple[tuple[str, float], ...], Mechanism] = {}
+
+    def mechanism_with(overrides: Mapping[str, float]) -> Mechanism:
+        key = tuple(sorted(overrides.items()))
+        if key not in loaded:
+            loaded[key] = _mechanism(path, overrides)
+        return loaded[key]
+
     cases = []
     for spec in campaign.case:
         if only and spec.name not in only:
             continue
         try:
             overrides = layered(campaign.parameters, spec.parameters, settings or {})
-            key = tuple(sorted(overrides.items()))
-            if key not in loaded:
-                loaded[key] = _mechanism(path, overrides)
-            _check_candidates(campaign, loaded[key])
-            cases.append(_resolve(spec, file, path, overrides, loaded[key]))
+            if relative:
+                before = mechanism_with(overrides)
+                changes = resolve_changes(type(before), dataclasses.asdict(before.parameters), relative)
+                overrides = layered(overrides, changes)
+            mechanism = mechanism_with(overrides)
+            _check_candidates(campaign, mechanism)
+            cases.append(_resolve(spec, file, path, overrides, mechanism))
         except WorkbenchError as error:
             raise _in_case(error, file, spec.name) from error
     return cases

@@ -44,6 +44,7 @@ def run_campaign(
     model: Path | None = None,
     only: Sequence[str] = (),
     settings: Mapping[str, float] | None = None,
+    relative: Sequence[str] = (),
     command: Sequence[str] = (),
     progress: Progress | None = None,
     report: Callable[[Path], object] | None = None,
@@ -63,6 +64,8 @@ def run_campaign(
         Names of the cases to run; empty is all.
     settings
         Parameters that go over those of campaign and cases.
+    relative
+        Changes like ``a2*=1.1`` of what a parameter then is, case by case.
     command
         The command line, for the manifest.
     progress
@@ -82,7 +85,7 @@ def run_campaign(
     directory = out or Path("reports") / campaign.name
     check_output(directory, store.RUN)
     check_engines(effort.engines)
-    cases = resolve_cases(campaign, file, model, tuple(only), settings)
+    cases = resolve_cases(campaign, file, model, tuple(only), settings, relative)
     results: list[CaseResult] = []
     with staged(directory) as stage:
         for number, case in enumerate(cases):

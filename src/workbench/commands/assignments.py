@@ -5,10 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from workbench.errors import ParameterError
+from workbench.mechanisms.assignments import parse_assignment
+
+SETTING = "NAME=VALUE with a number in SI units"
+RELATIVE = ("*=", "/=", "+=", "-=")
 
 
-def settings(assignments: Iterable[str]) -> dict[str, float]:
-    """Read ``--set NAME=VALUE`` options, SI units.
+def settings(assignments: Iterable[str]) -> tuple[dict[str, float], list[str]]:
+    """Read ``--set NAME=VALUE`` options, SI units, and ``NAME*=FACTOR`` with its like.
+
+    Returns
+    -------
+    dict, list
+        New values by name, and the changes (``a2*=1.1``) that are relative to what a parameter is without them.
 
     Raises
     ------
@@ -16,16 +25,22 @@ def settings(assignments: Iterable[str]) -> dict[str, float]:
         No ``=``, a value that is not a number, or a name given twice.
     """
     found: dict[str, float] = {}
+    relative: list[str] = []
+    names: set[str] = set()
     for assignment in assignments:
-        name, value = _split(assignment, "--set", "NAME=VALUE with a number in SI units")
-        try:
-            number = float(value)
-        except ValueError:
-            raise ParameterError(f'--set "{assignment}": expected NAME=VALUE with a number in SI units') from None
-        if name in found:
+        name, value = _split(assignment, "--set", SETTING)
+        if any(operator in assignment for operator in RELATIVE):
+            name = parse_assignment(assignment).name
+            relative.append(assignment)
+        else:
+            try:
+                found[name] = float(value)
+            except ValueError:
+                raise ParameterError(f'--set "{assignment}": expected {SETTING}') from None
+        if name in names:
             raise ParameterError(f"--set {name} is given twice")
-        found[name] = number
-    return found
+        names.add(name)
+    return found, relative
 
 
 def ranges(assignments: Iterable[str]) -> dict[str, tuple[float, float]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +21,8 @@ def workspace(
         typer.Option(metavar="JOINT=LOW:HIGH", help="Range of an active joint, m or rad; may be repeated."),
     ] = None,
     set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter, SI; may be repeated.")
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter, SI; a2*=1.1 scales."),
     ] = None,
     campaign: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Mark where the cases of this campaign run in it.")
@@ -30,16 +32,21 @@ def workspace(
     ] = None,
 ) -> None:
     """Compute the reachable workspace by discretisation: volume with its error, cells as Parquet, figures."""
-    from workbench.campaign.cases import resolve_cases
+    from workbench.campaign.cases import layered, resolve_cases
     from workbench.campaign.spec import load_campaign
     from workbench.console import print_workspace
+    from workbench.mechanisms.assignments import resolve_changes
     from workbench.mjcf import load_mechanism
     from workbench.report.workspace import draw_workspace
     from workbench.staging import check_output, staged
     from workbench.workspace.grid import compute_workspace
     from workbench.workspace.store import WORKSPACE, workspace_facts, write_workspace
 
-    mechanism = load_mechanism(model, **settings(set_ or []))
+    values, relative = settings(set_ or [])
+    mechanism = load_mechanism(model, **values)
+    if relative:
+        changes = resolve_changes(type(mechanism), asdict(mechanism.parameters), relative)
+        mechanism = load_mechanism(model, **layered(values, changes))
     directory = out or Path("reports") / f"workspace_{mechanism.name}"
     check_output(directory, WORKSPACE)
     paths = {}

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 
 SIDES = ("left", "right")
 
+LARGEST_NUMBER = 1e10
+"""MuJoCo's own bound on positions and velocities; beyond it a simulation counts as diverged. Below it products of
+parameters stay far from the end of floating point."""
+
 
 @dataclass(frozen=True)
 class ParameterInfo:
@@ -102,7 +106,10 @@ def expand_names(table: tuple[ParameterInfo, ...], changes: Mapping[str, float])
     for name in sorted(changes, key=lambda n: n in stored):
         if isinstance(changes[name], bool) or not isinstance(changes[name], int | float | np.floating | np.integer):
             raise ParameterError(f"parameter {name}: {changes[name]!r} is not a number", parameter=name)
-        value = float(changes[name])
+        try:
+            value = float(changes[name])
+        except OverflowError:  # an integer with more than 308 digits
+            value = math.inf if changes[name] > 0 else -math.inf
         if name in stored:
             result[name] = value
         elif name in sided:
@@ -113,7 +120,7 @@ def expand_names(table: tuple[ParameterInfo, ...], changes: Mapping[str, float])
 
 
 def check_parameters(table: tuple[ParameterInfo, ...], values: Mapping[str, float]) -> None:
-    """Refuse values that are not finite or outside the table's range.
+    """Refuse values that are not finite, larger than `LARGEST_NUMBER`, or outside the table's range.
 
     Raises
     ------
@@ -123,13 +130,15 @@ def check_parameters(table: tuple[ParameterInfo, ...], values: Mapping[str, floa
     for name, info in stored_names(table).items():
         value = values[name]
         low = value < info.minimum or (value == info.minimum and not info.minimum_allowed)
-        if not math.isfinite(value) or low or value > info.maximum:
+        if not abs(value) <= LARGEST_NUMBER or low or value > info.maximum:
             bounds = []
             if info.minimum > -math.inf:
                 bounds.append(f"{'>=' if info.minimum_allowed else '>'} {info.minimum:g}")
             if info.maximum < math.inf:
                 bounds.append(f"<= {info.maximum:g}")
-            allowed = " and ".join(bounds) or "a finite number"
+            if not bounds or value > LARGEST_NUMBER:
+                bounds.append(f"at most {LARGEST_NUMBER:g} in size")
+            allowed = " and ".join(bounds)
             unit = f" {info.unit}" if info.unit not in ("", "1") else ""
             raise ParameterError(
                 f"parameter {name} = {value:g}{unit}; allowed: {allowed} ({info.meaning})",
