@@ -10,6 +10,23 @@ from workbench.errors import ArrayError
 FloatArray = NDArray[np.float64]
 
 
+def as_rows(name: str, value: ArrayLike, columns: int = 3) -> FloatArray:
+    """Return *value* as a C-contiguous float64 array of shape ``(n, columns)``, its entries not looked at.
+
+    Raises
+    ------
+    ArrayError
+        Wrong shape or not numeric.
+    """
+    try:
+        array = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArrayError(f"{name}: expected numbers of shape (n, {columns}), got {type(value).__name__}") from error
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise ArrayError(f"{name}: expected shape (n, {columns}), got {array.shape}", argument=name, shape=array.shape)
+    return array
+
+
 def as_batch(name: str, value: ArrayLike, columns: int = 3) -> FloatArray:
     """Return *value* as a finite, C-contiguous float64 array of shape ``(n, columns)``.
 
@@ -27,12 +44,7 @@ def as_batch(name: str, value: ArrayLike, columns: int = 3) -> FloatArray:
     ArrayError
         Wrong shape, not numeric, or not finite; the message names the first bad sample.
     """
-    try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ArrayError(f"{name}: expected numbers of shape (n, {columns}), got {type(value).__name__}") from error
-    if array.ndim != 2 or array.shape[1] != columns:
-        raise ArrayError(f"{name}: expected shape (n, {columns}), got {array.shape}", argument=name, shape=array.shape)
+    array = as_rows(name, value, columns)
     finite = np.isfinite(array)
     if not finite.all():
         sample, column = np.argwhere(~finite)[0]
@@ -52,7 +64,17 @@ def as_batches(columns: int = 3, **arguments: ArrayLike) -> tuple[FloatArray, ..
     ArrayError
         As `as_batch`, or when the arguments' lengths differ.
     """
-    arrays = {name: as_batch(name, value, columns) for name, value in arguments.items()}
+    return same_lengths(**{name: as_batch(name, value, columns) for name, value in arguments.items()})
+
+
+def same_lengths(**arrays: FloatArray) -> tuple[FloatArray, ...]:
+    """Return arrays that agree on the number of samples.
+
+    Raises
+    ------
+    ArrayError
+        They do not; the message lists names and lengths.
+    """
     lengths = {name: len(array) for name, array in arrays.items()}
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"{name} {length}" for name, length in lengths.items())

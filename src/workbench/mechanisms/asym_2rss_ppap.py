@@ -21,9 +21,11 @@ from workbench.mechanisms.asym_2rss_ppap_friction import Friction
 from workbench.mechanisms.asym_2rss_ppap_kernel import SINGULAR
 from workbench.mechanisms.asym_2rss_ppap_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
 from workbench.mechanisms.base import Mechanism, Reach
+from workbench.mechanisms.kernel_call import TorqueKernel, fill_torques, one_sample
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.mass_models import mass_model as mass_model_of
 from workbench.mechanisms.parameters import ParameterInfo, Target, UniformRule
+from workbench.mechanisms.sine_cosine import LARGEST_ANGLE
 
 ELBOWS = ("out", "in")
 
@@ -212,21 +214,49 @@ class Asym2rssPpap(Mechanism):
         return self._scaled(self._motion(array, zero, zero)[4])
 
     def torques(
-        self, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, external_force: FloatArray
+        self,
+        q: FloatArray,
+        qd: FloatArray,
+        qdd: FloatArray,
+        mass_model: str,
+        external_force: FloatArray,
+        threads: int = 1,
     ) -> FloatArray:
-        """Inverse dynamics on checked arrays; see `Mechanism.inverse_dynamics`.
+        """Inverse dynamics on arrays of checked shape; see `Mechanism.torques`.
 
         *mass_model* may be any that `workbench.mechanisms.mass_models.mass_model` knows.
         """
+        constants = self._constants_of(mass_model)
+        tau = np.empty_like(q)
+        if fill_torques(kernel.torques_batch, constants, q, qd, qdd, external_force, tau, threads):
+            self._refuse_torques(q, qd, qdd, tau)
+        return tau
+
+    def kernel(self, mass_model: str = "distributed") -> TorqueKernel:
+        """Inverse dynamics of one sample at a time, prepared for control loops; see `Mechanism.kernel`."""
+        self._check_mass_model(mass_model)
+
+        def refuse(q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> None:
+            self.torques(q, qd, qdd, mass_model, force)
+
+        constants = self._constants_of(mass_model)
+        return one_sample(kernel.torques_single, constants, refuse, self.friction if self.has_friction else None)
+
+    def _refuse_torques(self, q: FloatArray, qd: FloatArray, qdd: FloatArray, tau: FloatArray) -> None:
+        """Name the sample and the joint of a batch whose torques are not all finite."""
+        self._motion(q, qd, qdd)
+        bad = ~np.isfinite(tau).all(axis=1)
+        self._refuse(bad, "q1, q2, q3", "rates so large that torques overflow", q, "q")
+
+    def _constants_of(self, mass_model: str) -> FloatArray:
         if mass_model not in self._constants:
             self._constants[mass_model] = kernel.pack(self._parameters, mass_model_of(mass_model))
-        tau = np.empty_like(q)
-        kernel.torques_batch(self._constants[mass_model], q, qd, qdd, external_force, tau)
-        if not np.isfinite(tau).all():
-            self._motion(q, qd, qdd)  # names the sample and the joint
-            bad = ~np.isfinite(tau).all(axis=1)
-            self._refuse(bad, "q1, q2, q3", "rates so large that torques overflow", q, "q")
-        return tau
+        return self._constants[mass_model]
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether any joint has friction or a rotor."""
+        return bool(self._friction)
 
     def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
         """What the actuators must supply for friction and rotors; see `Mechanism.friction` and docs/friction.md."""
@@ -249,6 +279,8 @@ class Asym2rssPpap(Mechanism):
         kernel.motion_batch(self._constants["distributed"], q, qd, qdd, x, xd, xdd, jacobian, determinants)
         p = self._parameters
         rod = min(p.a2_left, p.a2_right)
+        turned = np.abs(q[:, 1:]).max(axis=1, initial=0.0)
+        self._refuse(turned > LARGEST_ANGLE, "q2, q3", f"an angle exceeds {LARGEST_ANGLE:g} rad", q, "q")
         self._refuse(np.abs(q[:, 0]) > rod, "q1", f"|q1| exceeds the rod length {rod:g} m", q, "q")
         self._refuse(np.isnan(x).any(axis=1), "q2, q3", "the rods cannot meet at the platform", q, "q")
         self._refuse(np.abs(x[:, 1]) >= p.a5, "q2, q3", f"|x2| reaches the parallelogram's length {p.a5:g} m", q, "q")

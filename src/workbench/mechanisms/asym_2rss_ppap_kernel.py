@@ -18,10 +18,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from workbench.arrays import FloatArray
+from workbench.compiled import compiled, inlined
+from workbench.mechanisms.blocks import BLOCK, COLUMNS, finite, load, store
 from workbench.mechanisms.mass_models import MASS_MODELS, Bar, MassModel
+from workbench.mechanisms.sine_cosine import sine_cosine
 
 SINGULAR = 1e-6
 """A pose counts as singular when a determinant, divided by the lengths it is made of, is below this: torques there are
@@ -74,19 +76,23 @@ def pack(p: Any, model: MassModel = MASS_MODELS["distributed"]) -> FloatArray:
         p.a5**2,
         swing.distal + p.m6,
         p.g * (swing.weight_distal + p.m6),
-        # a determinant of J_x below this is a singular pose
+        # det J_x, J_q22 or J_q33 below these is a singular pose
         SINGULAR * p.a2_left * p.a2_right,
+        SINGULAR * p.a1_left * p.a2_left,
+        SINGULAR * p.a1_right * p.a2_right,
     )
     return np.array(constants, dtype=np.float64)
 
 
-@njit(cache=True, error_model="numpy")
-def _kinematics(c, q1, s2, c2, s3, c3, qd1, qd2, qd3, qdd1, qdd2, qdd3):  # type: ignore[no-untyped-def]
-    """Platform position, velocity, acceleration and the rods; NaN outside the workspace.
+@inlined
+def _kinematics(c, q1, q2, q3, qd1, qd2, qd3, qdd1, qdd2, qdd3):  # type: ignore[no-untyped-def]
+    """Platform position, velocity, acceleration and the rods; NaN outside the workspace and at singular poses.
 
     [Almeida2010] eq. (1)-(2). The platform hangs: of the two meets of the circles that E and F allow, the larger x3.
     """
     a1l, a1r = c[2], c[3]
+    s2, c2 = sine_cosine(q2)
+    s3, c3 = sine_cosine(q3)
     # arm tips relative to the spherical joints' mounting points, so that both rods end in x
     cy, cz = -c[0] - a1l * c2, a1l * s2
     dy, dz = c[1] + a1r * c3, a1r * s3
@@ -109,7 +115,8 @@ def _kinematics(c, q1, s2, c2, s3, c3, qd1, qd2, qd3, qdd1, qdd2, qdd3):  # type
     jq2 = u2 * tcy + u3 * tcz
     jq3 = w2 * tdy + w3 * tdz
     det = u2 * w3 - u3 * w2
-    inv = 1.0 / det if abs(det) > c[20] else math.nan
+    regular = (abs(det) > c[20]) & (abs(jq2) > c[21]) & (abs(jq3) > c[22])
+    inv = 1.0 / det if regular else math.nan
     r2 = jq2 * qd2 - q1 * qd1
     r3 = jq3 * qd3 - q1 * qd1
     xd2 = (w3 * r2 - u3 * r3) * inv
@@ -132,13 +139,13 @@ def _kinematics(c, q1, s2, c2, s3, c3, qd1, qd2, qd3, qdd1, qdd2, qdd3):  # type
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
-def torques_sample(c, q1, s2, c2, s3, c3, qd1, qd2, qd3, qdd1, qdd2, qdd3, f1, f2, f3):  # type: ignore[no-untyped-def]
+@inlined
+def torques_sample(c, q1, q2, q3, qd1, qd2, qd3, qdd1, qdd2, qdd3, f1, f2, f3):  # type: ignore[no-untyped-def]
     """tau1, tau2, tau3 by virtual work; [Almeida2010] eq. (4)-(6) and (13)-(15) in end-point coordinates."""
     (
         x2, _x3, xd2, _xd3, xdd2, xdd3, u2, u3, w2, w3, inv, jq2, jq3,
         tcy, tcz, tdy, tdz, cddy, cddz, dddy, dddz,
-    ) = _kinematics(c, q1, s2, c2, s3, c3, qd1, qd2, qd3, qdd1, qdd2, qdd3)  # fmt: skip
+    ) = _kinematics(c, q1, q2, q3, qd1, qd2, qd3, qdd1, qdd2, qdd3)  # fmt: skip
     # forces that the moving parts need at C, D and at the platform
     fcy = c[6] * cddy + c[7] * xdd2
     fcz = c[6] * cddz + c[7] * xdd3 - c[9]
@@ -163,17 +170,36 @@ def torques_sample(c, q1, s2, c2, s3, c3, qd1, qd2, qd3, qdd1, qdd2, qdd3, f1, f
     return tau1, tau2, tau3
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def torques_batch(c, q, qd, qdd, force, tau):  # type: ignore[no-untyped-def]
-    """Fill tau ``(n, 3)``; samples outside the workspace become NaN."""
-    for i in range(q.shape[0]):
-        tau[i, 0], tau[i, 1], tau[i, 2] = torques_sample(
-            c, q[i, 0], math.sin(q[i, 1]), math.cos(q[i, 1]), math.sin(q[i, 2]), math.cos(q[i, 2]),
-            qd[i, 0], qd[i, 1], qd[i, 2], qdd[i, 0], qdd[i, 1], qdd[i, 2], force[i, 0], force[i, 1], force[i, 2],
-        )  # fmt: skip
+    """Fill tau ``(n, 3)``; returns how many samples have no finite torques, those outside the workspace among them."""
+    block, bad = np.empty(COLUMNS * BLOCK), 0
+    for first in range(0, q.shape[0], BLOCK):
+        count = min(BLOCK, q.shape[0] - first)
+        load(block, q, qd, qdd, force, first, count)
+        for i in range(count):
+            block[12 * BLOCK + i], block[13 * BLOCK + i], block[14 * BLOCK + i] = torques_sample(
+                c, block[i], block[BLOCK + i], block[2 * BLOCK + i],
+                block[3 * BLOCK + i], block[4 * BLOCK + i], block[5 * BLOCK + i],
+                block[6 * BLOCK + i], block[7 * BLOCK + i], block[8 * BLOCK + i],
+                block[9 * BLOCK + i], block[10 * BLOCK + i], block[11 * BLOCK + i],
+            )  # fmt: skip
+        bad += store(block, tau, first, count)
+    return bad
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
+def torques_single(c, q, qd, qdd, force, tau):  # type: ignore[no-untyped-def]
+    """One sample, arrays ``(3,)``: fill tau; returns whether shapes are right and tau is finite."""
+    if not (len(q) == len(qd) == len(qdd) == len(force) == len(tau) == 3):
+        return False
+    tau[0], tau[1], tau[2] = torques_sample(
+        c, q[0], q[1], q[2], qd[0], qd[1], qd[2], qdd[0], qdd[1], qdd[2], force[0], force[1], force[2]
+    )
+    return finite(tau[0], tau[1], tau[2])
+
+
+@compiled
 def motion_batch(c, q, qd, qdd, x, xd, xdd, jacobian, determinants):  # type: ignore[no-untyped-def]
     """Fill platform motion, J = J_x^-1 J_q ``(n, 3, 3)`` and (det J_x, J_q22, J_q33) ``(n, 3)``."""
     for i in range(q.shape[0]):
@@ -181,8 +207,7 @@ def motion_batch(c, q, qd, qdd, x, xd, xdd, jacobian, determinants):  # type: ig
             x2, x3, xd2, xd3, xdd2, xdd3, u2, u3, w2, w3, inv, jq2, jq3,
             _tcy, _tcz, _tdy, _tdz, _cddy, _cddz, _dddy, _dddz,
         ) = _kinematics(
-            c, q[i, 0], math.sin(q[i, 1]), math.cos(q[i, 1]), math.sin(q[i, 2]), math.cos(q[i, 2]),
-            qd[i, 0], qd[i, 1], qd[i, 2], qdd[i, 0], qdd[i, 1], qdd[i, 2],
+            c, q[i, 0], q[i, 1], q[i, 2], qd[i, 0], qd[i, 1], qd[i, 2], qdd[i, 0], qdd[i, 1], qdd[i, 2]
         )  # fmt: skip
         x[i, 0], x[i, 1], x[i, 2] = q[i, 0], x2, x3
         xd[i, 0], xd[i, 1], xd[i, 2] = qd[i, 0], xd2, xd3

@@ -6,12 +6,12 @@ import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from workbench.arrays import FloatArray, as_batches, as_force
+from workbench.arrays import FloatArray, as_force, as_rows, same_lengths
 from workbench.errors import ParameterError, did_you_mean
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.parameters import (
@@ -23,11 +23,17 @@ from workbench.mechanisms.parameters import (
     stored_names,
 )
 
+if TYPE_CHECKING:
+    from workbench.mechanisms.kernel_call import TorqueKernel
+
 NEAR_SINGULAR = 0.05
 """A pose is worth a warning when a scaled determinant is below this: a factor of twenty between forces and torques."""
 
 LONGEST_LINK = 20.0
 """Metres; no parallel robot of this kind has a longer link, so a longer one was written in millimetres."""
+
+NO_FORCE: FloatArray = np.zeros((1, 3))
+NO_FORCE.flags.writeable = False
 
 
 @dataclass(frozen=True)
@@ -208,6 +214,11 @@ class Mechanism(ABC):
             if info.unit == "m" and abs(value := getattr(self._parameters, name)) > LONGEST_LINK
         ]
 
+    @property
+    def has_friction(self) -> bool:
+        """Whether `friction` may be anything but zero."""
+        return True
+
     def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
         """What the actuators must supply for friction and rotor inertia, ``(n, na)``; `torques` leaves it out."""
         return np.zeros_like(q)
@@ -218,9 +229,30 @@ class Mechanism(ABC):
 
     @abstractmethod
     def torques(
-        self, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, external_force: FloatArray
+        self,
+        q: FloatArray,
+        qd: FloatArray,
+        qdd: FloatArray,
+        mass_model: str,
+        external_force: FloatArray,
+        threads: int = 1,
     ) -> FloatArray:
-        """Inverse dynamics without friction on checked arrays; see `inverse_dynamics`."""
+        """Inverse dynamics without friction on arrays of checked shape, force ``(n, 3)`` or ``(1, 3)``.
+
+        Entries that are not finite are refused here; see `inverse_dynamics`.
+        """
+
+    @abstractmethod
+    def kernel(self, mass_model: str = "distributed") -> TorqueKernel:
+        """Inverse dynamics of one sample at a time, prepared for control loops.
+
+        Returns
+        -------
+        TorqueKernel
+            ``tau = kernel(q, qd, qdd, external_force=None, out=None)`` on float64 arrays ``(3,)``, friction included.
+            Everything is compiled before this method returns. With *out* a call allocates nothing; the errors are those
+            of `inverse_dynamics`, and *out* is not to be read after one. Other parameters need another kernel.
+        """
 
     def inverse_dynamics(
         self,
@@ -229,6 +261,7 @@ class Mechanism(ABC):
         qdd: ArrayLike,
         mass_model: str = "distributed",
         external_force: ArrayLike | None = None,
+        threads: int = 1,
     ) -> FloatArray:
         """Actuator forces and torques that produce a motion.
 
@@ -240,6 +273,8 @@ class Mechanism(ABC):
             One of `mass_models`: bars with their rotational inertia, or without.
         external_force
             Newtons, paper frame, acting on the platform: ``(3,)`` or ``(n, 3)``; None is no force.
+        threads
+            At most so many threads share a large batch; the result is the same, bit for bit.
 
         Returns
         -------
@@ -255,8 +290,14 @@ class Mechanism(ABC):
         MotionError
             A sample outside the workspace or at a singular pose; the message names sample and joint.
         """
+        self._check_mass_model(mass_model)
+        q, qd, qdd = same_lengths(q=as_rows("q", q), qd=as_rows("qd", qd), qdd=as_rows("qdd", qdd))
+        force = NO_FORCE if external_force is None else as_force("external_force", external_force, len(q))
+        tau = self.torques(q, qd, qdd, mass_model, force, threads)
+        if self.has_friction:
+            tau += self.friction(q, qd, qdd)
+        return tau
+
+    def _check_mass_model(self, mass_model: str) -> None:
         if mass_model not in self.mass_models:
             raise ParameterError(f'unknown mass model "{mass_model}"{did_you_mean(mass_model, self.mass_models)}')
-        q, qd, qdd = as_batches(q=q, qd=qd, qdd=qdd)
-        force = as_force("external_force", external_force, len(q))
-        return self.torques(q, qd, qdd, mass_model, force) + self.friction(q, qd, qdd)

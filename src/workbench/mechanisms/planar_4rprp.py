@@ -17,13 +17,12 @@ from workbench.errors import MotionError
 from workbench.mechanisms import planar_4rprp_kernel as kernel
 from workbench.mechanisms import planar_4rprp_screws as screw_route
 from workbench.mechanisms.base import Candidate, Condition, Mechanism, Reach
+from workbench.mechanisms.kernel_call import TorqueKernel, fill_torques, one_sample
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.parameters import ParameterInfo, Target, UniformRule
 from workbench.mechanisms.planar_4rprp_friction import Friction
+from workbench.mechanisms.planar_4rprp_kernel import SINGULAR
 from workbench.mechanisms.planar_4rprp_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
-
-SINGULAR = 1e-6
-"""A pose counts as singular when a measure is below this: forces there are a million times those that cause them."""
 
 BAR_INERTIA = {"distributed": 1.0, "lumped": 0.0}
 HOME_SOLUTION = 2
@@ -244,16 +243,41 @@ class Planar4Rprp(Mechanism):
         return result
 
     def torques(
-        self, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, external_force: FloatArray
+        self,
+        q: FloatArray,
+        qd: FloatArray,
+        qdd: FloatArray,
+        mass_model: str,
+        external_force: FloatArray,
+        threads: int = 1,
     ) -> FloatArray:
-        """Inverse dynamics on checked arrays; see `Mechanism.inverse_dynamics`."""
+        """Inverse dynamics on arrays of checked shape; see `Mechanism.torques`."""
+        constants = self._constants[mass_model]
         tau = np.empty_like(q)
-        kernel.torques_batch(self._constants[mass_model], q, qd, qdd, external_force, tau)
-        if not np.isfinite(tau).all():
-            self.platform_motion(q, qd, qdd)  # names the sample and the joint
-            bad = np.asarray(~np.isfinite(tau).all(axis=1))
-            self._refuse(bad, "q1, q2, q3", "rates so large that forces overflow", q, "q")
+        if fill_torques(kernel.torques_batch, constants, q, qd, qdd, external_force, tau, threads):
+            self._refuse_torques(q, qd, qdd, tau)
         return tau
+
+    def kernel(self, mass_model: str = "distributed") -> TorqueKernel:
+        """Inverse dynamics of one sample at a time, prepared for control loops; see `Mechanism.kernel`."""
+        self._check_mass_model(mass_model)
+
+        def refuse(q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> None:
+            self.torques(q, qd, qdd, mass_model, force)
+
+        constants = self._constants[mass_model]
+        return one_sample(kernel.torques_single, constants, refuse, self.friction if self.has_friction else None)
+
+    def _refuse_torques(self, q: FloatArray, qd: FloatArray, qdd: FloatArray, tau: FloatArray) -> None:
+        """Name the sample and the joint of a batch whose torques are not all finite."""
+        self.platform_motion(q, qd, qdd)
+        bad = ~np.isfinite(tau).all(axis=1)
+        self._refuse(bad, "q1, q2, q3", "rates so large that forces overflow", q, "q")
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether any joint has friction or a rotor."""
+        return bool(self._friction)
 
     def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
         """What the actuators must supply for friction and rotors; see `Mechanism.friction` and docs/friction.md."""

@@ -13,9 +13,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from workbench.arrays import FloatArray
+from workbench.compiled import compiled, inlined
+from workbench.mechanisms.blocks import BLOCK, COLUMNS, finite, load, store
+
+SINGULAR = 1e-6
+"""A pose counts as singular when a measure is below this: forces there are a million times those that cause them."""
 
 
 def pack(p: Any, bar_inertia: float = 1.0) -> FloatArray:
@@ -49,7 +53,7 @@ def pack(p: Any, bar_inertia: float = 1.0) -> FloatArray:
     return np.array(constants, dtype=np.float64)
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
 def _position(c, q1, q2, q3):  # type: ignore[no-untyped-def]
     """Px, Py, Pz with Px > 0, Py > 0; NaN where the limbs cannot meet. [GarciaMurillo2016] eq. (14)-(16)."""
     b = c[1]
@@ -62,7 +66,7 @@ def _position(c, q1, q2, q3):  # type: ignore[no-untyped-def]
     return x, y, z
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
 def _rates(c, q1, q2, q3, x, y, z, qd1, qd2, qd3, qdd1, qdd2, qdd3):  # type: ignore[no-untyped-def]
     """Velocity and acceleration of P: eq. (9)-(11) differentiated twice, solved for z, then y, then x."""
     b, low = c[1], y - c[2]
@@ -79,7 +83,7 @@ def _rates(c, q1, q2, q3, x, y, z, qd1, qd2, qd3, qdd1, qdd2, qdd3):  # type: ig
     return xd, yd, zd, xdd, ydd, zdd
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
 def _limb(c, inertia, s, y, sd, yd, sdd, ydd):  # type: ignore[no-untyped-def]
     """Force (along s, along y) that a limb with r = B - A = (s, y) needs at B to move and to be carried."""
     q = math.sqrt(s * s + y * y)
@@ -96,7 +100,7 @@ def _limb(c, inertia, s, y, sd, yd, sdd, ydd):  # type: ignore[no-untyped-def]
     return along * ws - across * wy, along * wy + across * ws
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
 def torques_sample(c, q1, q2, q3, qd1, qd2, qd3, qdd1, qdd2, qdd3, fx, fy, fz):  # type: ignore[no-untyped-def]
     """tau1, tau2, tau3 by virtual work in platform coordinates: J_r^T tau = force that the moving parts need at P."""
     x, y, z = _position(c, q1, q2, q3)
@@ -109,24 +113,45 @@ def torques_sample(c, q1, q2, q3, qd1, qd2, qd3, qdd1, qdd2, qdd3, fx, fy, fz): 
     px = c[9] * xdd + s2 + s4 - fx
     py = c[10] * ydd + c[11] + y1 + y2 + y3 + y4 - fy
     pz = c[9] * zdd + s1 + s3 - fz
+    # det J_r = b Px Py / (q1 q2 q3), and the passive limb's length q4
+    far = (b * x * y > SINGULAR * q1 * q2 * q3) & ((x - a) * (x - a) + low * low > (SINGULAR * a) * (SINGULAR * a))
     # tau_i/q_i from the columns of J_r^T = [r_i / q_i]: x row, then y and z rows together
-    d2 = px / x
+    d2 = px / x if far else math.nan
     both = (py - low * d2) / y
     d3 = (z * both - pz) / b
     return q1 * (both - d3), q2 * d2, q3 * d3
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def torques_batch(c, q, qd, qdd, force, tau):  # type: ignore[no-untyped-def]
-    """Fill tau ``(n, 3)``; samples outside the workspace become NaN."""
-    for i in range(q.shape[0]):
-        tau[i, 0], tau[i, 1], tau[i, 2] = torques_sample(
-            c, q[i, 0], q[i, 1], q[i, 2], qd[i, 0], qd[i, 1], qd[i, 2], qdd[i, 0], qdd[i, 1], qdd[i, 2],
-            force[i, 0], force[i, 1], force[i, 2],
-        )  # fmt: skip
+    """Fill tau ``(n, 3)``; returns how many samples have no finite torques, those outside the workspace among them."""
+    block, bad = np.empty(COLUMNS * BLOCK), 0
+    for first in range(0, q.shape[0], BLOCK):
+        count = min(BLOCK, q.shape[0] - first)
+        load(block, q, qd, qdd, force, first, count)
+        for i in range(count):
+            block[12 * BLOCK + i], block[13 * BLOCK + i], block[14 * BLOCK + i] = torques_sample(
+                c, block[i], block[BLOCK + i], block[2 * BLOCK + i],
+                block[3 * BLOCK + i], block[4 * BLOCK + i], block[5 * BLOCK + i],
+                block[6 * BLOCK + i], block[7 * BLOCK + i], block[8 * BLOCK + i],
+                block[9 * BLOCK + i], block[10 * BLOCK + i], block[11 * BLOCK + i],
+            )  # fmt: skip
+        bad += store(block, tau, first, count)
+    return bad
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
+def torques_single(c, q, qd, qdd, force, tau):  # type: ignore[no-untyped-def]
+    """One sample, arrays ``(3,)``: fill tau; returns whether shapes are right and tau is finite."""
+    if not (len(q) == len(qd) == len(qdd) == len(force) == len(tau) == 3):
+        return False
+    tau[0], tau[1], tau[2] = torques_sample(
+        c, q[0], q[1], q[2], qd[0], qd[1], qd[2], qdd[0], qdd[1], qdd[2], force[0], force[1], force[2]
+    )
+    return finite(tau[0], tau[1], tau[2])
+
+
+@compiled
 def motion_batch(c, q, qd, qdd, x, xd, xdd):  # type: ignore[no-untyped-def]
     """Fill platform position, velocity and acceleration, each ``(n, 3)``; NaN outside the workspace."""
     for i in range(q.shape[0]):
