@@ -346,7 +346,7 @@ def test_show_lists_every_parameter_where_it_stands(model: Path) -> None:
         element = find(elements, tag, name[0] if name else "")
         assert element is not None
         attribute, _, index = row.attribute.rstrip("]").partition("[")
-        written = float(tokens(loaded.text, element, attribute)[int(index)][2])
+        written = float(tokens(loaded.text, element, attribute)[int(index or 0)][2])
         # the row's own rule, worked out with the row's own values, is the number that stands there
         product = eval(row.rule, {}, dict(loaded.values))
         assert written == pytest.approx(product, rel=1e-15)

@@ -14,6 +14,7 @@ import typer
 
 from workbench._version import __version__
 from workbench.commands.assignments import settings
+from workbench.commands.model import model
 from workbench.commands.workspace import workspace
 from workbench.errors import WorkbenchError
 
@@ -107,6 +108,7 @@ def run(
 
 
 app.command()(workspace)
+app.add_typer(model)
 
 
 def main() -> NoReturn:

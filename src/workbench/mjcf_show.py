@@ -11,6 +11,9 @@ from workbench.mechanisms.parameters import Target, stored_names
 from workbench.mjcf import load_model
 from workbench.mjcf_text import find, scan
 
+SCALARS = ("mass", "damping", "frictionloss", "armature")
+"""Attributes that hold one number."""
+
 
 @dataclass(frozen=True)
 class ParameterRow:
@@ -26,7 +29,7 @@ class ParameterRow:
     element: str
     """MJCF element that it is read from: ``inertial of rod_left``"""
     attribute: str
-    """attribute and number: ``pos[2]``"""
+    """attribute and number: ``pos[2]``; the attribute alone where it has one number"""
     rule: str
     """what the number is in terms of parameters: ``k2_left * a2_left``"""
     line: int | None
@@ -67,7 +70,7 @@ def show_parameters(path: str | Path) -> list[ParameterRow]:
                 meaning=info.meaning,
                 source=info.source,
                 element=_element(target),
-                attribute=f"{target.attribute}[{target.index}]",
+                attribute=target.attribute if target.attribute in SCALARS else f"{target.attribute}[{target.index}]",
                 rule=_rule(target),
                 line=element.line if element else None,
                 places=sum(name in other.of for other in loaded.kind.targets),

@@ -41,8 +41,8 @@ STEPS = 200
 FARTHEST = {"hinge": 2 * np.pi, "slide": 10.0}
 """How far from home a range is followed: a full turn (rad); for a slide, times the model's extent."""
 
-RANGE_STEPS = 24
-"""Halvings of the distance to where a joint's way ends."""
+BEYOND = 1e-3
+"""Part of a joint's way by which the second, more exact search goes beyond the end that the first one found."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,8 @@ class ModelCheck:
     file: str
     mechanism: str | None
     assumptions: tuple[Assumption, ...]
+    mobility_count: dict[str, int]
+    """by the formula of the mechanism's source; empty where it gives none or the model is broken"""
     mobility: Mobility | None
     """None where the loops cannot be closed"""
     idle_bodies: tuple[str, ...]
@@ -111,7 +113,17 @@ def check_model(path: str | Path, ranges: bool = True) -> ModelCheck:
             reached = _Closed(loaded)
         except WorkbenchError as error:
             return ModelCheck(
-                loaded.file, _name(loaded), tuple(assumptions), None, (), None, (), None, tuple(warnings), (str(error),)
+                loaded.file,
+                _name(loaded),
+                tuple(assumptions),
+                {},
+                None,
+                (),
+                None,
+                (),
+                None,
+                tuple(warnings),
+                (str(error),),
             )
         problems = list(reached.problems())
         found = reached.ranges() if ranges else ()
@@ -124,6 +136,7 @@ def check_model(path: str | Path, ranges: bool = True) -> ModelCheck:
         file=loaded.file,
         mechanism=_name(loaded),
         assumptions=tuple(assumptions),
+        mobility_count=loaded.mechanism.mobility_count() if loaded.mechanism else {},
         mobility=reached.mobility(),
         idle_bodies=reached.structure.idle,
         closure_residual=reached.residual,
@@ -196,27 +209,24 @@ class _Closed:
         return tuple(found)
 
     def _end(self, column: int, farthest: float) -> tuple[float, bool]:
-        """Where the way of one joint from home ends: a way that is blocked stays so, so halving finds the place."""
+        """Where the way of one joint from home ends, and whether no end was found."""
         home = self.closer.home[self.structure.actuated_qpos]
-        inside, outside = 0.0, farthest
-        if self._reaches(home, column, farthest):
+        blocked = self._blocked(home, column, farthest)
+        if blocked is None:
             return float(home[column] + farthest), True
-        for _ in range(RANGE_STEPS):
-            middle = 0.5 * (inside + outside)
-            if self._reaches(home, column, middle):
-                inside = middle
-            else:
-                outside = middle
-        return float(home[column] + inside), False
+        # the way is followed in steps down to a part of its length, so a shorter way ends more exactly
+        closer = self._blocked(home, column, (blocked - home[column]) * (1 + BEYOND))
+        return blocked if closer is None else closer, False
 
-    def _reaches(self, home: FloatArray, column: int, change: float) -> bool:
+    def _blocked(self, home: FloatArray, column: int, change: float) -> float | None:
+        """Where the way to *change* ends before its time; None where it does not."""
         target = home.copy()
         target[column] += change
         try:
             self.closer.close(target[None, :])
-        except MotionError:
-            return False
-        return True
+        except MotionError as error:
+            return float(error.facts["reached"][column])
+        return None
 
 
 def _agreement(

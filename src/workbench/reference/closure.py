@@ -216,6 +216,7 @@ class LoopCloser:
             sample=sample,
             joint=self.structure.joint_names[joint],
             value=q.tolist(),
+            reached=reached.tolist(),
         )
 
     def _worst_block(self, qpos: FloatArray) -> str:
