@@ -15,9 +15,10 @@ from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
 from workbench.campaign.spec import Campaign, CandidateSpec
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
 from workbench.campaign.verdict import CONTRAST, FAILURES, kind_of, verdict_of
-from workbench.errors import ArrayError, MotionError
+from workbench.errors import ArrayError, ModelError, MotionError
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.raw_inverse import raw_mj_inverse
+from workbench.reference.skeleton import skeleton
 
 RAW_INVERSE = "raw mj_inverse"
 """Name of the row that shows MuJoCo's inverse dynamics as it comes."""
@@ -32,6 +33,9 @@ RAW_NAME = "raw"
 KINEMATICS_BOUND = 1e-11
 """Largest difference of platform position, velocity or acceleration between closed form and MuJoCo, over their peaks:
 rounding, with two digits to spare near singular poses."""
+
+OTHER_BRANCH = 1e-6
+"""Metres; a platform farther than this from the closed form's is another pose of the mechanism, not rounding."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +81,11 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     ------
     MotionError
         The reference cannot follow the motion; the message names the time and the joint.
+    ModelError
+        The model's platform is somewhere else than the closed form's.
     """
     motion, mechanism = case.motion, case.mechanism
-    reference = MujocoReference(case.model, threads=1, **case.overrides)
+    reference = MujocoReference(case.model, threads=1, loaded=case.loaded, **case.overrides)
     results: dict[str, ReferenceResult] = {}
     series = _motion_columns(case)
     try:
@@ -93,6 +99,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
             torques[name] = tau
     except MotionError as error:
         raise at_time(error, motion.t) from error
+    _refuse_other_branch(case, next(iter(results.values())).x)
     evidence = gather_evidence(case, reference, results, list(torques), effort)
     rows = [
         row
@@ -111,6 +118,20 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     series["closure_residual"] = first.closure_residual
     facts = _facts(case, reference, first, rows) | {"evidence": evidence.facts()}
     return CaseResult(case.name, rows, series, facts)
+
+
+def _refuse_other_branch(case: Case, x: FloatArray) -> None:
+    """Refuse a model whose platform ``(n, 3)`` is elsewhere: torques on another assembly branch compare nothing."""
+    gaps = np.linalg.norm(case.x - x, axis=1)
+    worst = int(gaps.argmax())
+    if gaps[worst] > OTHER_BRANCH:
+        raise ModelError(
+            f"{case.model}: the platform is {gaps[worst]:.3g} m from where the closed form puts it at t ="
+            f" {case.motion.t[worst]:.6g} s; allowed: {OTHER_BRANCH:g} m; is the home pose on another assembly branch?",
+            file=str(case.model),
+            time=float(case.motion.t[worst]),
+            value=float(gaps[worst]),
+        )
 
 
 def _raw_rows(
