@@ -18,7 +18,6 @@ from workbench.campaign.verdict import CONTRAST, FAILURES, kind_of, verdict_of
 from workbench.errors import ArrayError, ModelError, MotionError
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.raw_inverse import raw_mj_inverse
-from workbench.reference.skeleton import skeleton
 
 RAW_INVERSE = "raw mj_inverse"
 """Name of the row that shows MuJoCo's inverse dynamics as it comes."""
@@ -85,7 +84,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         The model's platform is somewhere else than the closed form's.
     """
     motion, mechanism = case.motion, case.mechanism
-    reference = MujocoReference(case.model, threads=1, loaded=case.loaded, **case.overrides)
+    reference = MujocoReference(case.model, threads=1, **case.overrides)
     results: dict[str, ReferenceResult] = {}
     series = _motion_columns(case)
     try:
