@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
+import hashlib
 import os
 import re
 from pathlib import Path
@@ -11,11 +13,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from workbench.errors import OutputError
-from workbench.report.curves import Plot
 from workbench.report.load import Run, load_run
+from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.sections import build_sections
-from workbench.report.style import inline, report_style, standalone
+from workbench.report.style import figure_style
+from workbench.report.svg import inline, standalone
 from workbench.report.text import fenced, finalize_markdown
 
 FIGURES = "figures"
@@ -44,12 +47,12 @@ def build_report(run_dir: Path) -> list[Path]:
     """
     run_dir = Path(run_dir)
     run = load_run(run_dir)
-    with report_style():
-        sections = build_sections(run)
+    sections = build_sections(run)
     files: dict[Path, str] = {}
-    for section in sections:
-        for plot in section.plots:
-            files[run_dir / FIGURES / f"{plot.key}.svg"] = standalone(plot.svg, plot.alt)
+    with figure_style():
+        for section in sections:
+            for plot in section.plots:
+                files[run_dir / FIGURES / f"{plot.key}.svg"] = standalone(plot.svg, plot.alt)
     files[run_dir / "report.md"] = render_markdown(run, sections)
     files[run_dir / "report.html"] = render_html(run, sections)
     try:
@@ -73,9 +76,29 @@ def render_html(run: Run, sections: list[Section]) -> str:
         (section, Markup(environment.get_template(f"{section.template}.html.j2").render(section.context)))
         for section in sections
     ]
-    style = environment.get_template("style.css").render()
+    style = _source(environment, "style.css")
+    script = _source(environment, "report.js")
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     page = environment.get_template("report.html.j2")
-    text = page.render(manifest=run.manifest, sections=bodies, style=Markup(style))
+    text = page.render(
+        manifest=run.manifest,
+        sections=bodies,
+        style=Markup(style),
+        script=Markup(script),
+        script_hash=f"sha256-{digest}",
+    )
+    return _without_blank_lines(text)
+
+
+def _source(environment: Environment, name: str) -> str:
+    """Return a file that goes into the page as it stands, without the blank lines that the page has none of."""
+    loader = environment.loader
+    if loader is None:
+        raise OutputError(f"{name}: the report's templates are missing")
+    return _without_blank_lines(loader.get_source(environment, name)[0])
+
+
+def _without_blank_lines(text: str) -> str:
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip()) + "\n"
 
 

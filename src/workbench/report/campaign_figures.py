@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.figure import FigureBase
 from matplotlib.ticker import FuncFormatter
 
 from workbench.report.curves import (
@@ -13,7 +14,6 @@ from workbench.report.curves import (
     MARKERS,
     Curve,
     ErrorCurve,
-    Plot,
     error_panel,
     platform_lines,
     torque_lines,
@@ -21,7 +21,8 @@ from workbench.report.curves import (
 from workbench.report.layout import SMALLEST_DRAWN, WIDE, figure_legend, legend, legend_rows, log_axis, stack
 from workbench.report.load import Run, Series
 from workbench.report.manifest import FigureRecord
-from workbench.report.style import PALETTE, new_figure, svg_of
+from workbench.report.plot import Plot
+from workbench.report.style import PALETTE
 from workbench.report.text import exact, pretty_unit
 
 LINEAR_FROM = 1e-4
@@ -35,21 +36,23 @@ PLATFORM = {
 """Kind of figure -> the series' columns and the label."""
 
 
-def campaign_plot(run: Run, record: FigureRecord, key: str, series: Series) -> Plot | str:
+def campaign_plot(run: Run, record: FigureRecord, key: str, series: Series, anchor: str) -> Plot | str:
     """Draw a figure of one case that the campaign declares, or say in a sentence why it cannot be drawn."""
     if record.kind == "torque":
-        return _campaign_torque(run, record, key, series)
+        return _campaign_torque(run, record, key, series, anchor)
     if record.kind not in PLATFORM:
         return f"Not drawn: this version knows no figure of kind {record.kind!r}."
     prefix, label = PLATFORM[record.kind]
-    figure = new_figure(*WIDE)
-    (axes,) = stack(figure, [1.0])
-    platform_lines(axes, run, series, prefix)
-    axes.set_ylabel(f"platform {label}")
-    legend(axes)
+
+    def draw(figure: FigureBase) -> None:
+        (axes,) = stack(figure, [1.0])
+        platform_lines(axes, run, series, prefix)
+        axes.set_ylabel(f"platform {label}")
+        legend(axes)
+
     axes_names = ", ".join(run.manifest.platform_axes)
     alt = f"{record.title}: platform {label} along {axes_names} over time, case {record.case}."
-    return Plot(key, svg_of(figure, key), alt, record.title)
+    return Plot(key, WIDE, draw, alt, record.title, anchor)
 
 
 def error_over_plot(run: Run, record: FigureRecord, key: str) -> Plot | str:
@@ -57,19 +60,15 @@ def error_over_plot(run: Run, record: FigureRecord, key: str) -> Plot | str:
     names = [curve.name for text in record.curves if (curve := Curve.parse(text)) and not curve.is_reference]
     joints = [record.joint] if record.joint else list(run.manifest.joints)
     lines = [(name, joint) for name in names for joint in joints]
-    figure = new_figure(*WIDE)
     columns = 3 if len(joints) == 3 else 4
-    (axes,) = stack(figure, [1.0], header=legend_rows(len(lines), columns))
-    drawn: list[float] = []
-    for name, joint in lines:
-        by_case = {
-            row.case: row.peak_error
-            for row in run.rows
-            if (row.candidate, row.reference, row.joint) == (name, record.reference, joint)
-        }
-        points = [(x, by_case[c]) for c, x in zip(record.cases, record.abscissa, strict=False) if c in by_case]
-        if points:
-            drawn += [error for _, error in points if math.isfinite(error)]
+    by_line = {line: _errors_over(run, record, *line) for line in lines}
+    drawn = [error for points in by_line.values() for _, error in points if math.isfinite(error)]
+    if not drawn:
+        return f"Not drawn: no stored error of {', '.join(names) or 'no curve'} against reference {record.reference}."
+
+    def draw(figure: FigureBase) -> None:
+        (axes,) = stack(figure, [1.0], header=legend_rows(len(lines), columns), over=record.label)
+        for (name, joint), points in by_line.items():
             turn = joints.index(joint)
             axes.plot(
                 [x for x, _ in points],
@@ -80,25 +79,32 @@ def error_over_plot(run: Run, record: FigureRecord, key: str) -> Plot | str:
                 markersize=4.5,
                 label=f"{name}, {joint}",
             )
-    if not drawn:
-        return f"Not drawn: no stored error of {', '.join(names) or 'no curve'} against reference {record.reference}."
-    if min(drawn) >= LINEAR_FROM:
-        axes.set_ylim(0.0, 1.08 * max(drawn))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.3g} %"))
-    else:
-        log_axis(axes, max(min(drawn), SMALLEST_DRAWN), max(drawn))
-    axes.set_xlabel(record.label)
-    axes.set_ylabel("peak error")
-    figure_legend(figure, axes, columns)
+        if min(drawn) >= LINEAR_FROM:
+            axes.set_ylim(0.0, 1.08 * max(drawn))
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.3g} %"))
+        else:
+            log_axis(axes, max(min(drawn), SMALLEST_DRAWN), max(drawn))
+        axes.set_ylabel("peak error")
+        figure_legend(figure, axes, columns)
+
     alt = (
         f"{record.title}: peak error against the {record.reference} reference over {record.label}, "
         f"for {', '.join(f'{name} on {joint}' for name, joint in lines)}; "
         f"from {exact(min(drawn), 3)} to {exact(max(drawn), 3)} of the reference's peak."
     )
-    return Plot(key, svg_of(figure, key), alt, record.title)
+    return Plot(key, WIDE, draw, alt, record.title)
 
 
-def _campaign_torque(run: Run, record: FigureRecord, key: str, series: Series) -> Plot | str:
+def _errors_over(run: Run, record: FigureRecord, name: str, joint: str) -> list[tuple[float, float]]:
+    by_case = {
+        row.case: row.peak_error
+        for row in run.rows
+        if (row.candidate, row.reference, row.joint) == (name, record.reference, joint)
+    }
+    return [(x, by_case[c]) for c, x in zip(record.cases, record.abscissa, strict=False) if c in by_case]
+
+
+def _campaign_torque(run: Run, record: FigureRecord, key: str, series: Series, anchor: str) -> Plot | str:
     joint = record.joint
     if joint not in run.manifest.joints:
         return f"Not drawn: joint {joint!r} is not one of {', '.join(run.manifest.joints)}."
@@ -111,11 +117,6 @@ def _campaign_torque(run: Run, record: FigureRecord, key: str, series: Series) -
     if not curves:
         return "Not drawn: the figure names no curves."
     unit = pretty_unit(run.manifest.unit_of(joint))
-    figure = new_figure(*WIDE)
-    above, below = stack(figure, [2.6, 1.0], header=legend_rows(len(curves), columns=4))
-    torque_lines(above, run, series, joint, curves)
-    above.set_ylabel(f"{joint} [{unit}]")
-    figure_legend(figure, above, columns=4)
     candidates = [curve.name for curve in curves if not curve.is_reference]
     errors, said = [], []
     for curve, base in error_pairs(run, curves):
@@ -125,12 +126,20 @@ def _campaign_torque(run: Run, record: FigureRecord, key: str, series: Series) -
             error = np.abs(series[curve.column(joint)] - reference) / peak
             color = PALETTE[candidates.index(curve.name) % 6]
             same = base.is_reference and run.manifest.candidates[curve.name].mass_model == base.name
-            errors.append(ErrorCurve(series["t"], error, color, is_modelling=not same))
+            label = f"{curve.label} − {base.label}"
+            errors.append(ErrorCurve(series["t"], error, color, is_modelling=not same, label=label))
             said.append(f"{curve.label} against {base.label}")
-    error_panel(below, errors, [])
+
+    def draw(figure: FigureBase) -> None:
+        above, below = stack(figure, [2.6, 1.0], header=legend_rows(len(curves), columns=4))
+        torque_lines(above, run, series, joint, curves)
+        above.set_ylabel(f"{joint} [{unit}]")
+        figure_legend(figure, above, columns=4)
+        error_panel(below, errors, [])
+
     comparison = f"; below, the error of {' and of '.join(said)} over the latter's peak" if said else ""
     alt = f"{record.title}: {joint} in {unit} over time of {', '.join(c.label for c in curves)}{comparison}."
-    return Plot(key, svg_of(figure, key), alt, record.title)
+    return Plot(key, WIDE, draw, alt, record.title, anchor)
 
 
 def error_pairs(run: Run, curves: Sequence[Curve]) -> list[tuple[Curve, Curve]]:

@@ -8,7 +8,6 @@ from typing import Any
 
 from workbench.metrics import POINTWISE_FLOOR
 from workbench.report.budget import budget_tables
-from workbench.report.curves import Plot
 from workbench.report.evidence import (
     conditions_table,
     evidence_table,
@@ -16,9 +15,11 @@ from workbench.report.evidence import (
     singularity_table,
     solutions_table,
 )
-from workbench.report.figures import motion_plots, torque_plots
+from workbench.report.figures import motion_plots, reaction_plot, torque_plots
 from workbench.report.load import ErrorRow, Run, Series
 from workbench.report.manifest import CaseRecord
+from workbench.report.mechanism import mechanism_plot
+from workbench.report.plot import Plot
 from workbench.report.tables import CASE_STATUS, KINDS, Cell, Status, Table, columns, verdict_status
 from workbench.report.text import error_fraction, exact, percent, pretty_unit, scientific, with_unit
 
@@ -43,7 +44,11 @@ class CaseView:
     facts: tuple[tuple[str, str], ...]
     motion: tuple[Plot, ...]
     torques: tuple[Plot, ...]
+    mechanism: Plot | None
+    reactions: Plot | None
     tables: tuple[Table, ...]
+    times: str = ""
+    """first and last moment, and the moment of the largest error, for the time slider"""
 
     @property
     def heading(self) -> str:
@@ -53,7 +58,8 @@ class CaseView:
     @property
     def plots(self) -> tuple[Plot, ...]:
         """All figures of the case."""
-        return self.motion + self.torques
+        others = tuple(plot for plot in (self.mechanism, self.reactions) if plot is not None)
+        return self.motion + self.torques + others
 
 
 def case_view(run: Run, case: str, anchor: str, series: Series | None) -> CaseView:
@@ -77,8 +83,18 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None) -> CaseVi
         facts=tuple(_facts(record)),
         motion=tuple(motion_plots(run, case, anchor, series)) if series is not None else (),
         torques=tuple(torque_plots(run, case, anchor, series)) if series is not None else (),
+        mechanism=mechanism_plot(run, case, anchor, series) if series is not None else None,
+        reactions=reaction_plot(run, case, anchor, series) if series is not None else None,
         tables=tuple(table for table in tables if table.rows),
+        times=_times(rows, series) if series is not None else "",
     )
+
+
+def _times(rows: list[ErrorRow], series: Series) -> str:
+    time = series["t"]
+    judged = [row for row in rows if row.kind != "contrast" and math.isfinite(row.worst_time_s)]
+    worst = max(judged, key=lambda row: row.badness).worst_time_s if judged else float(time[0])
+    return " ".join(f"{moment:.6g}" for moment in (float(time[0]), float(time[-1]), worst))
 
 
 def _facts(record: CaseRecord) -> list[tuple[str, str]]:

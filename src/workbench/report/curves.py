@@ -27,16 +27,6 @@ ERROR_POINTS = 150
 
 
 @dataclass(frozen=True)
-class Plot:
-    """A drawn figure: the file-safe key, the SVG, the text for those who cannot see it and a caption."""
-
-    key: str
-    svg: str
-    alt: str
-    caption: str
-
-
-@dataclass(frozen=True)
 class Curve:
     """One line of a torque figure: ``cand:NAME`` or ``ref:MASS_MODEL``."""
 
@@ -68,6 +58,7 @@ class ErrorCurve:
     error: FloatArray
     color: str
     is_modelling: bool
+    label: str
     worst: tuple[float, float] | None = None
 
 
@@ -124,7 +115,8 @@ def error_of_row(row: ErrorRow, series: Series, color: str) -> ErrorCurve | None
     if candidate is None or reference is None or not row.normaliser > 0:
         return None
     error = np.abs(candidate - reference) / row.normaliser
-    return ErrorCurve(series["t"], error, color, row.kind == "modelling", (row.worst_time_s, row.peak_error))
+    label = f"{row.candidate} − {row.reference}"
+    return ErrorCurve(series["t"], error, color, row.kind == "modelling", label, (row.worst_time_s, row.peak_error))
 
 
 def error_panel(axes: Axes, curves: Sequence[ErrorCurve], bounds: Iterable[float]) -> None:
@@ -133,7 +125,7 @@ def error_panel(axes: Axes, curves: Sequence[ErrorCurve], bounds: Iterable[float
     for curve in curves:
         time, error = _envelope(curve.time, np.maximum(curve.error, SMALLEST_DRAWN))
         style = (0, (3, 1)) if curve.is_modelling else "-"
-        axes.plot(time, error, color=curve.color, linewidth=0.8, linestyle=style)
+        axes.plot(time, error, color=curve.color, linewidth=0.8, linestyle=style, label=curve.label)
         low = min(low, float(np.nanquantile(error, 0.03)))
         high = max(high, float(np.nanmax(error)))
     for curve in curves:

@@ -6,11 +6,14 @@ import math
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import FigureBase, SubFigure
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
 from workbench.report.style import INK
+from workbench.report.svg import OVER_TIME, OWN
 
+MOMENT = f"{OWN}moment"
+"""Mark of texts that belong to one moment: out of place while the time axis is zoomed."""
 SMALLEST_DRAWN = 1e-17
 """Errors below this, zero among them, are drawn here: a logarithmic axis has no zero."""
 SMALL = (4.4, 3.4)
@@ -30,9 +33,9 @@ def log_axis(axes: Axes, low: float, high: float) -> None:
     axes.minorticks_off()
 
 
-def stack(figure: Figure, heights: Sequence[float], header: int = 0) -> list[Axes]:
-    """Put panels one above the other on one time axis; *header* is the lines of room for a legend above them."""
-    width, height = figure.get_size_inches()
+def stack(figure: FigureBase, heights: Sequence[float], header: int = 0, over: str = "time [s]") -> list[Axes]:
+    """Put panels one above the other on one axis *over*; *header* is the lines of room for a legend above them."""
+    width, height = size_of(figure)
     left, right, bottom, gap = 0.62 / width, 1 - 0.12 / width, 0.42 / height, 0.14 / height
     top = 1 - (0.1 + 0.165 * header) / height
     room = top - bottom - gap * (len(heights) - 1)
@@ -42,13 +45,21 @@ def stack(figure: Figure, heights: Sequence[float], header: int = 0) -> list[Axe
         axes = figure.add_axes((left, top - panel, right - left, panel), sharex=panels[0] if panels else None)
         axes.locator_params(nbins=5)
         axes.margins(x=0.01)
+        if over == "time [s]":
+            axes.set_gid(OVER_TIME)
         top -= panel + gap
         panels.append(axes)
     for axes in panels[:-1]:
         axes.tick_params(labelbottom=False)
-    panels[-1].set_xlabel("time [s]")
+    panels[-1].set_xlabel(over)
     figure.align_ylabels(panels)
     return panels
+
+
+def size_of(figure: FigureBase) -> tuple[float, float]:
+    """Return width and height in inches, of a figure or of a part of one."""
+    box, dpi = figure.bbox, figure.figure.dpi if isinstance(figure, SubFigure) else figure.dpi  # type: ignore[attr-defined]
+    return box.width / dpi, box.height / dpi
 
 
 def legend_rows(count: int, columns: int = 2) -> int:
@@ -56,7 +67,7 @@ def legend_rows(count: int, columns: int = 2) -> int:
     return math.ceil(count / columns)
 
 
-def figure_legend(figure: Figure, axes: Axes, columns: int = 2) -> None:
+def figure_legend(figure: FigureBase, axes: Axes, columns: int = 2) -> None:
     """Put the legend of *axes* above all panels."""
     handles, labels = axes.get_legend_handles_labels()
     if handles:
@@ -83,4 +94,6 @@ def legend(axes: Axes) -> None:
 def mark(axes: Axes, time: float, value: float, text: str) -> None:
     """Mark one moment of a curve with a triangle and a number."""
     axes.plot([time], [value], "v", color=INK, markersize=4.5)
-    axes.annotate(text, (time, value), (0, 4), textcoords="offset points", ha="center", va="bottom", fontsize=8)
+    axes.annotate(
+        text, (time, value), (0, 4), textcoords="offset points", ha="center", va="bottom", fontsize=8, gid=MOMENT
+    )

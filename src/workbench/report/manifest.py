@@ -156,6 +156,23 @@ class EvidenceRecord(Record):
     replay: ReplaySetRecord | None = None
 
 
+class JointRecord(Record):
+    """A joint of the drawing."""
+
+    point: str
+    kind: str = ""
+    actuated: bool = False
+
+
+class DrawingRecord(Record):
+    """What a drawing of the mechanism joins; the points over time stand in the series."""
+
+    links: dict[str, tuple[tuple[str, str], ...]] = {}
+    joints: dict[str, JointRecord] = {}
+    platform: str
+    up: tuple[float, float, float]
+
+
 class CaseRecord(Record):
     """One case: its status and the scalar evidence about mechanism and reference. Missing evidence is None."""
 
@@ -186,6 +203,7 @@ class CaseRecord(Record):
     conditions: tuple[ConditionRecord, ...] = ()
     solutions_at_start: tuple[tuple[float | None, ...], ...] = ()
     evidence: EvidenceRecord = EvidenceRecord()
+    drawing: DrawingRecord | None = None
     warnings: tuple[str, ...] = ()
 
 

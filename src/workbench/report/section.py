@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from workbench.report.curves import Plot
+from workbench.report.plot import Plot
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from typing import Any
 from workbench.report.budget import budget_section
 from workbench.report.campaign_figures import campaign_plot, error_over_plot
 from workbench.report.case_section import CaseView, case_view
-from workbench.report.curves import Plot
 from workbench.report.error_sections import claims_section, worst_section
 from workbench.report.load import Run, Series
 from workbench.report.manifest import FigureRecord
+from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.tables import CASE_STATUS, CHECKED, Cell, Table, columns
 from workbench.report.text import error_fraction, exact, pretty_unit, scientific, slug
@@ -51,7 +51,7 @@ def build_sections(run: Run) -> list[Section]:
         for index, figure in enumerate(figures):
             if figure.case == name and figure.kind != "error_over":
                 drawn[index] = (
-                    campaign_plot(run, figure, keys[index], series)
+                    campaign_plot(run, figure, keys[index], series, anchors[name])
                     if series is not None
                     else f"Not drawn: case {name} ended in an error."
                 )

@@ -23,6 +23,8 @@ def verdict_section(run: Run) -> Section:
     """Say in one sentence whether every bound holds, and list the formulas that were tested."""
     status, sentence = verdict(run)
     sentence = sentence[:1].upper() + sentence[1:]
+    contrasts = {row.candidate for row in run.rows if row.kind == "contrast"}
+    tested = sum(name not in contrasts for name in run.manifest.candidates)
     timed = any(candidate.cost_us is not None for candidate in run.manifest.candidates.values())
     names = ("Candidate", "Mass model", "What it is", "Source", *(("Cost [µs per sample]",) if timed else ()))
     table = Table(
@@ -42,7 +44,7 @@ def verdict_section(run: Run) -> Section:
         "The mass model is the assumption about the bars' masses that a formula shares with its reference."
         + (" The cost is timed in the run and is the one figure that differs from run to run." if timed else ""),
     )
-    context = {"status": status, "sentence": sentence, "manifest": run.manifest, "tables": [table]}
+    context = {"status": status, "sentence": sentence, "manifest": run.manifest, "tables": [table], "tested": tested}
     return Section("verdict", "Verdict", "verdict", context)
 
 

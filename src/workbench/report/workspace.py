@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from workbench.arrays import FloatArray
 from workbench.errors import OutputError
-from workbench.report.style import INK, PALETTE, new_figure, report_style
+from workbench.report.style import INK, PALETTE, figure_style
+from workbench.report.svg import new_figure
 
 CELLS = "workspace.parquet"
 FACTS = "workspace.json"
@@ -47,7 +48,7 @@ def draw_workspace(directory: Path, paths: Mapping[str, FloatArray] | None = Non
     folder = directory / "figures"
     folder.mkdir(exist_ok=True)
     written = []
-    with report_style():
+    with figure_style():
         for name, figure in (("sections", _sections(facts, cells, marked)), ("space", _space(facts, cells, marked))):
             for suffix in ("svg", "png"):
                 path = folder / f"workspace_{name}.{suffix}"

@@ -1,0 +1,34 @@
+"""A figure of a report: how to draw it, and the words that stand for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from matplotlib.figure import FigureBase
+
+from workbench.report.svg import new_figure, svg_of
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure: the file-safe key, its size in inches, how to draw it, an alternative text and a caption."""
+
+    key: str
+    size: tuple[float, float]
+    draw: Callable[[FigureBase], None] = field(repr=False)
+    """draws into a whole figure or a part of a page"""
+    alt: str
+    caption: str
+    case: str = ""
+    """anchor of the case whose time slider moves a marker through it"""
+    frames: str = ""
+    """JSON of the positions that the page's script animates"""
+
+    @cached_property
+    def svg(self) -> str:
+        """The drawing, made when it is first asked for; inside the style that is set then."""
+        figure = new_figure(*self.size)
+        self.draw(figure)
+        return svg_of(figure, self.key)

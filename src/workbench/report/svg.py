@@ -1,0 +1,155 @@
+"""Figures as SVG: small, the same bytes everywhere, in the page's colours, and legible for the page's script.
+
+The script reads the panels' scales from the attribute ``data-panels`` and finds curves by their class, so that a
+marker, a zoom and the values under the pointer need no second copy of the numbers.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import warnings
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from workbench.report.style import THEME
+
+POINTS_PER_INCH = 72.0
+OWN = "wb-"
+"""Identifiers that begin so become classes, for the script to find."""
+OVER_TIME = f"{OWN}over-time"
+"""Mark of panels whose abscissa is time; `layout.stack` sets it."""
+
+_DECLARATIONS = re.compile(
+    r"^.*?(?=<svg)|<metadata>.*?</metadata>\s*|<defs>\s*<style.*?</style>\s*</defs>\s*", re.DOTALL
+)
+_GEOMETRY = re.compile(r'(?<= )(?:d|x|y|transform)="[^"<>]*"')
+_LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
+_FONT = re.compile(r"font-family: [^;\"]*")
+_IDENTIFIER = re.compile(r'(?<=<)(\w+)([^<>]*?) id="([^"<>]*)"')
+_REFERENCE = re.compile(r'(url\(#|href="#)([^")]+)')
+_SVG_TAG = re.compile(r"<svg[^>]*>")
+_PANELS = re.compile(r'data-panels="[^"]*"')
+_VIEW_BOX = re.compile(r'viewBox="([^"]*)"')
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure, inches, that draws to SVG without a display or pyplot's global state."""
+    figure = Figure(figsize=(width, height))
+    FigureCanvasSVG(figure)
+    return figure
+
+
+def svg_of(figure: Figure, key: str) -> str:
+    """Draw *figure* as the body of an SVG document: no dates, two decimals, identifiers that start with *key*."""
+    panels = _tag(figure)
+    buffer = io.StringIO()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph")  # a name in another script: the reader's font has it
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    svg = compact(buffer.getvalue(), key)
+    if panels:
+        told = escape_xml(json.dumps(panels, ensure_ascii=False, separators=(",", ":")))
+        svg = svg.replace("<svg ", f'<svg data-panels="{told}" ', 1)
+    return svg
+
+
+def _tag(figure: Figure) -> list[dict[str, Any]]:
+    """Name the panels over time and their curves, and return where they stand and what their axes measure."""
+    width, height = (POINTS_PER_INCH * side for side in figure.get_size_inches())
+    panels: list[dict[str, Any]] = []
+    for axes in figure.axes:
+        if axes.get_gid() != OVER_TIME:
+            continue
+        number = len(panels)
+        axes.set_gid(f"{OWN}panel-{number}")
+        axes.xaxis.set_gid(f"{OWN}times-{number}")
+        box = axes.get_position()
+        panels.append(
+            {
+                "box": [round(v, 2) for v in _corners(box.x0, box.y0, box.x1, box.y1, width, height)],
+                "x": [float(f"{v:.8g}") for v in axes.get_xlim()],
+                "y": [float(f"{v:.8g}") for v in axes.get_ylim()],
+                "log": axes.get_yscale() == "log",
+                "name": axes.get_ylabel(),
+                "curves": _tag_curves(axes, number),
+            }
+        )
+    return panels
+
+
+def _corners(x0: float, y0: float, x1: float, y1: float, width: float, height: float) -> tuple[float, ...]:
+    return x0 * width, (1 - y1) * height, x1 * width, (1 - y0) * height
+
+
+def _tag_curves(axes: Axes, number: int) -> list[str]:
+    names: list[str] = []
+    for line in axes.lines:
+        if _is_curve(line):
+            line.set_gid(f"{OWN}curve-{number}-{len(names)}")
+            names.append(str(line.get_label()))
+    return names
+
+
+def _is_curve(line: Line2D) -> bool:
+    drawn = line.get_linestyle() not in ("None", "none", "", " ")
+    return drawn and not str(line.get_label()).startswith("_") and np.size(line.get_xdata()) > 2
+
+
+def compact(svg: str, key: str) -> str:
+    """Strip what matplotlib adds around the drawing, round coordinates and make identifiers unique to *key*."""
+    svg = _DECLARATIONS.sub("", svg)
+    svg = _GEOMETRY.sub(
+        lambda match: _LONG_NUMBER.sub(lambda number: f"{float(number[0]):.2f}", match[0].replace("\n", "")), svg
+    )
+    svg = _FONT.sub("font-family: sans-serif", svg)
+    used = {match[2] for match in _REFERENCE.finditer(svg)}
+
+    def identifier(match: re.Match[str]) -> str:
+        if match[3].startswith(OWN):
+            return f'{match[1]}{match[2]} class="{match[3]}"'
+        kept = f' id="{key}-{match[3]}"' if match[3] in used else ""
+        return f"{match[1]}{match[2]}{kept}"
+
+    svg = _IDENTIFIER.sub(identifier, svg)
+    svg = _REFERENCE.sub(lambda match: f"{match[1]}{key}-{match[2]}", svg)
+    return re.sub(r"\n\s*", "\n", svg)
+
+
+def standalone(svg: str, alt: str) -> str:
+    """Return a complete SVG file with a white background and *alt* as its title."""
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + _open(svg, alt, stand_alone=True)
+
+
+def inline(svg: str, alt: str) -> str:
+    """Return the SVG for use inside an HTML page: colours are CSS variables, the size follows the page."""
+    for colour, variable in THEME.items():
+        svg = svg.replace(f": {colour}", f": {variable}")
+    return _open(svg, alt, stand_alone=False)
+
+
+def _open(svg: str, alt: str, stand_alone: bool) -> str:
+    found = _VIEW_BOX.search(svg)
+    box = found[1] if found else "0 0 1 1"
+    text = escape_xml(alt)
+    if stand_alone:
+        width, height = box.split()[2:]
+        names = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+        tag = f'<svg {names} width="{width}pt" height="{height}pt" viewBox="{box}" role="img"><title>{text}</title>'
+    else:
+        panels = _PANELS.search(svg)
+        told = f" {panels[0]}" if panels else ""
+        tag = f'<svg viewBox="{box}" role="img" aria-label="{text}"{told}>'
+    return _SVG_TAG.sub(lambda _: tag, svg, count=1)
+
+
+def escape_xml(text: str) -> str:
+    """Escape *text* for an XML attribute or element, and drop characters that XML does not know."""
+    kept = "".join(c for c in text if c in "\t\n" or c >= " ")
+    return kept.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace('"', "&quot;")

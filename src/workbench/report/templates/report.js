@@ -1,0 +1,350 @@
+/* What the page adds where scripts run: tables that sort and filter, and one time slider per case that moves a marker
+   through its plots and its drawing. Everything is readable without it; nothing is loaded and nothing is sent. */
+"use strict";
+(() => {
+  const SVG = "http://www.w3.org/2000/svg";
+  const make = (tag, attributes = {}, text = "") => {
+    const element = document.createElement(tag);
+    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+    if (text) element.textContent = text;
+    return element;
+  };
+  const draw = (tag, attributes, parent) => {
+    const element = document.createElementNS(SVG, tag);
+    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+    parent.appendChild(element);
+    return element;
+  };
+  const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+  const short = (value) => {
+    if (value === null || !Number.isFinite(value)) return "–";
+    const size = Math.abs(value);
+    return size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(1) : String(Number(value.toPrecision(3)));
+  };
+
+  /* ---- tables ---- */
+  const FILTER_FROM = 8;
+  const keyOf = (cell) => {
+    const value = cell.dataset.value;
+    return value === undefined ? null : Number(value);
+  };
+  const compare = (a, b) => {
+    const [x, y] = [keyOf(a), keyOf(b)];
+    if (x !== null && y !== null) return (Number.isNaN(x) ? Infinity : x) - (Number.isNaN(y) ? Infinity : y) || 0;
+    if (x !== null || y !== null) return x !== null ? -1 : 1;
+    return a.textContent.localeCompare(b.textContent, "en", { numeric: true });
+  };
+  for (const table of document.querySelectorAll(".table table")) {
+    const body = table.tBodies[0];
+    const rows = [...body.rows];
+    if (rows.length < 2) continue;
+    const headings = [...table.tHead.rows[0].cells];
+    headings.forEach((heading, column) => {
+      const button = make("button", { type: "button", class: "sort" }, heading.textContent);
+      heading.replaceChildren(button);
+      button.addEventListener("click", () => {
+        const state = heading.getAttribute("aria-sort");
+        headings.forEach((other) => other.removeAttribute("aria-sort"));
+        if (state === "ascending") {
+          body.append(...rows); // third press: the order of the report
+          return;
+        }
+        const turn = state === "descending" ? 1 : -1;
+        heading.setAttribute("aria-sort", turn > 0 ? "ascending" : "descending");
+        body.append(...[...rows].sort((a, b) => turn * compare(a.cells[column], b.cells[column])));
+      });
+    });
+    if (rows.length < FILTER_FROM) continue;
+    const wrapper = table.closest(".table");
+    const label = make("label", { class: "filter" }, "Filter rows ");
+    const field = make("input", { type: "search", autocomplete: "off", spellcheck: "false" });
+    const told = make("output", { "aria-live": "polite" });
+    label.append(field);
+    const line = make("p", { class: "tools" });
+    line.append(label, told);
+    wrapper.insertBefore(line, wrapper.querySelector(".scroll"));
+    field.addEventListener("input", () => {
+      const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+      let shown = 0;
+      for (const row of rows) {
+        const text = row.textContent.toLowerCase();
+        row.hidden = !words.every((word) => text.includes(word));
+        shown += row.hidden ? 0 : 1;
+      }
+      told.textContent = words.length ? ` ${shown} of ${rows.length} rows` : "";
+    });
+  }
+
+  /* ---- plots over time ---- */
+  const parsePath = (d) => {
+    const found = [];
+    for (const match of d.matchAll(/([MLz])\s*(?:(-?[\d.]+(?:e-?\d+)?)\s+(-?[\d.]+(?:e-?\d+)?))?/g)) {
+      if (match[2] !== undefined) found.push([match[1], Number(match[2]), Number(match[3])]);
+    }
+    return found;
+  };
+
+  class Panel {
+    constructor(svg, told, number) {
+      this.svg = svg;
+      [this.left, this.top, this.right, this.bottom] = told.box;
+      [this.start, this.stop] = told.x;
+      [this.low, this.high] = told.y;
+      this.isLog = told.log;
+      this.name = told.name;
+      this.group = svg.querySelector(`.wb-panel-${number}`);
+      this.ticks = svg.querySelector(`.wb-times-${number}`);
+      this.window = [this.start, this.stop];
+      this.curves = told.curves.map((label, index) => {
+        const path = svg.querySelector(`.wb-curve-${number}-${index} path`);
+        return path ? { label, path, points: parsePath(path.getAttribute("d")) } : null;
+      }).filter(Boolean);
+      const own = new Set(this.curves.map((curve) => curve.path));
+      this.uses = [...this.group.querySelectorAll("use")]
+        .filter((use) => !use.closest('[class^="wb-times"]') && Number(use.getAttribute("x")) > this.left + 0.01)
+        .map((use) => ({ use, x: Number(use.getAttribute("x")), shown: use.style.display }));
+      this.moments = [...this.group.querySelectorAll(".wb-moment")];
+      this.own = own;
+      this.cursor = draw("line", { class: "cursor", y1: this.top, y2: this.bottom, visibility: "hidden" }, svg);
+      this.dots = this.curves.map(() => draw("circle", { class: "dot", r: 2.6, visibility: "hidden" }, svg));
+    }
+
+    whole(time) { return this.left + (time - this.start) / (this.stop - this.start) * (this.right - this.left); }
+
+    at(time) { return this.left + (time - this.window[0]) / (this.window[1] - this.window[0]) * (this.right - this.left); }
+
+    time(x) { return this.window[0] + (x - this.left) / (this.right - this.left) * (this.window[1] - this.window[0]); }
+
+    value(curve, time) {
+      const x = this.whole(time);
+      const { points } = curve;
+      let [first, last] = [0, points.length - 1];
+      if (last < 0 || x < points[0][1] - 0.3 || x > points[last][1] + 0.3) return null;
+      while (last - first > 1) {
+        const middle = (first + last) >> 1;
+        if (points[middle][1] <= x) first = middle; else last = middle;
+      }
+      const [a, b] = [points[first], points[last]];
+      const share = b[1] === a[1] ? 0 : clamp((x - a[1]) / (b[1] - a[1]), 0, 1);
+      const y = a[2] + share * (b[2] - a[2]);
+      const part = (this.bottom - y) / (this.bottom - this.top);
+      if (!this.isLog) return { y, value: this.low + part * (this.high - this.low) };
+      return { y, value: 10 ** (Math.log10(this.low) + part * Math.log10(this.high / this.low)) };
+    }
+
+    mark(time) {
+      const x = this.at(time);
+      const inside = time !== null && x >= this.left - 0.5 && x <= this.right + 0.5;
+      this.cursor.setAttribute("visibility", inside ? "visible" : "hidden");
+      this.cursor.setAttribute("x1", x.toFixed(2));
+      this.cursor.setAttribute("x2", x.toFixed(2));
+      const told = [];
+      this.curves.forEach((curve, index) => {
+        const found = inside ? this.value(curve, time) : null;
+        const dot = this.dots[index];
+        const within = found && found.y >= this.top - 1 && found.y <= this.bottom + 1;
+        dot.setAttribute("visibility", within ? "visible" : "hidden");
+        if (within) {
+          dot.setAttribute("cx", x.toFixed(2));
+          dot.setAttribute("cy", found.y.toFixed(2));
+          dot.style.fill = curve.path.style.stroke;
+          told.push(`${curve.label} ${short(found.value)}`);
+        }
+      });
+      return told.length ? `${this.name}: ${told.join(", ")}` : "";
+    }
+
+    zoom(window) {
+      this.window = window;
+      const [start, stop] = window;
+      const isWhole = start <= this.start && stop >= this.stop;
+      const scale = (this.stop - this.start) / (stop - start);
+      const shift = this.left - scale * (this.whole(start) - this.left) - scale * 0;
+      const moved = (x) => (isWhole ? x : shift + scale * (x - this.left));
+      for (const { path, points } of this.curves) {
+        path.setAttribute("d", points.map(([kind, x, y]) => `${kind} ${moved(x).toFixed(2)} ${y}`).join(" "));
+      }
+      for (const { use, x } of this.uses) {
+        const place = moved(x);
+        use.setAttribute("x", place.toFixed(2));
+        use.style.display = place < this.left - 1 || place > this.right + 1 ? "none" : "";
+      }
+      for (const text of this.moments) text.style.display = isWhole ? "" : "none";
+      if (this.ticks) this.ticks.style.display = isWhole ? "" : "none";
+      this.marks?.remove();
+      if (!isWhole) this.drawTicks(start, stop);
+    }
+
+    drawTicks(start, stop) {
+      this.marks = draw("g", { class: "ticks", "aria-hidden": "true" }, this.svg);
+      const rough = (stop - start) / 4;
+      const decade = 10 ** Math.floor(Math.log10(rough));
+      const step = decade * [1, 2, 5, 10].find((factor) => factor * decade >= rough);
+      const labelled = this.isLowest;
+      for (let k = Math.ceil(start / step); k * step <= stop + 1e-9; k += 1) {
+        const x = this.at(k * step).toFixed(2);
+        draw("line", { x1: x, x2: x, y1: this.top, y2: this.bottom }, this.marks);
+        if (labelled) {
+          const text = draw("text", { x, y: this.bottom + 12 }, this.marks);
+          text.textContent = Number((k * step).toPrecision(6));
+        }
+      }
+      if (labelled) {
+        const text = draw("text", { x: (this.left + this.right) / 2, y: this.bottom + 24 }, this.marks);
+        text.textContent = "time [s]";
+      }
+    }
+  }
+
+  /* ---- the drawing that moves ---- */
+  class Mechanism {
+    constructor(svg, told) {
+      this.told = told;
+      this.views = told.views.map((rows) => {
+        const sum = rows[0].map(() => 0);
+        return rows.map((row) => row.map((step, k) => (sum[k] += step) / told.scale));
+      });
+      this.lines = told.views.map((_, view) => Object.entries(told.lines).map(
+        ([kind, pairs]) => [svg.querySelector(`.wb-line-${view}-${kind} path`), pairs]));
+      this.joints = told.views.map((_, view) => Object.entries(told.joints).map(
+        ([kind, members]) => [[...svg.querySelectorAll(`.wb-joint-${view}-${kind} use`)], members]));
+    }
+
+    show(time) {
+      const { t } = this.told;
+      let [first, last] = [0, t.length - 1];
+      while (last - first > 1) {
+        const middle = (first + last) >> 1;
+        if (t[middle] <= time) first = middle; else last = middle;
+      }
+      const share = last > first ? clamp((time - t[first]) / (t[last] - t[first]), 0, 1) : 0;
+      this.views.forEach((frames, view) => {
+        const at = (k) => [0, 1].map((side) => {
+          const [a, b] = [frames[first][2 * k + side], frames[last][2 * k + side]];
+          return (a + share * (b - a)).toFixed(2);
+        });
+        for (const [path, pairs] of this.lines[view]) {
+          path?.setAttribute("d", pairs.map(([a, b]) => `M ${at(a).join(" ")} L ${at(b).join(" ")}`).join(" "));
+        }
+        for (const [uses, members] of this.joints[view]) {
+          uses.forEach((use, k) => {
+            const [x, y] = at(members[k]);
+            use.setAttribute("x", x);
+            use.setAttribute("y", y);
+          });
+        }
+      });
+    }
+  }
+
+  class Figure {
+    constructor(figure, group) {
+      this.svg = figure.querySelector("svg");
+      const told = JSON.parse(this.svg.dataset.panels ?? "[]");
+      this.panels = told.map((panel, number) => new Panel(this.svg, panel, number));
+      if (this.panels.length) this.panels.at(-1).isLowest = true;
+      this.mechanism = figure.dataset.frames ? new Mechanism(this.svg, JSON.parse(figure.dataset.frames)) : null;
+      if (!this.panels.length) return;
+      this.readout = make("p", { class: "readout" });
+      figure.querySelector(".drawing").after(this.readout);
+      const timeAt = (event) => {
+        const box = this.svg.getBoundingClientRect();
+        const view = this.svg.viewBox.baseVal;
+        return this.panels[0].time((event.clientX - box.left) / box.width * view.width);
+      };
+      this.svg.addEventListener("pointermove", (event) => this.show(group.limit(timeAt(event))));
+      this.svg.addEventListener("pointerleave", () => this.show(group.shown));
+      this.svg.addEventListener("click", (event) => group.set(timeAt(event)));
+    }
+
+    show(time) {
+      this.mechanism?.show(time ?? 0);
+      if (!this.panels.length) return;
+      const told = this.panels.map((panel) => panel.mark(time)).filter(Boolean);
+      this.readout.textContent = time === null ? "" : `t = ${short(time)} s · ${told.join(" · ")}`;
+    }
+  }
+
+  class Case {
+    constructor(article) {
+      [this.start, this.stop, this.worst] = article.dataset.times.split(" ").map(Number);
+      this.time = this.start;
+      this.shown = null;
+      this.window = [this.start, this.stop];
+      this.figures = [...document.querySelectorAll("figure[data-case]")]
+        .filter((figure) => figure.dataset.case === article.id && figure.querySelector("svg"))
+        .map((figure) => new Figure(figure, this));
+      if (!this.figures.length || !(this.stop > this.start)) return;
+      const bar = make("div", { class: "times", role: "group", "aria-label": `Time in ${article.id.slice(5)}` });
+      const button = (text, label, act) => {
+        const made = make("button", { type: "button", title: label, "aria-label": label }, text);
+        made.addEventListener("click", act);
+        bar.append(made);
+        return made;
+      };
+      this.play = button("▶", "Play", () => this.toggle());
+      this.slider = make("input", {
+        type: "range", min: this.start, max: this.stop, step: (this.stop - this.start) / 1000, value: this.start,
+        "aria-label": "Time",
+      });
+      this.clock = make("output");
+      bar.append(this.slider, this.clock);
+      button("worst", "Go to the worst moment", () => this.set(this.worst));
+      button("+", "Zoom in on the time", () => this.zoom(0.5));
+      button("−", "Zoom out", () => this.zoom(2));
+      button("⟲", "Show the whole time", () => this.zoom(Infinity));
+      this.slider.addEventListener("input", () => this.set(Number(this.slider.value)));
+      const place = article.querySelector("h4");
+      article.insertBefore(bar, place);
+      this.tell();
+    }
+
+    limit(time) { return clamp(time, this.start, this.stop); }
+
+    set(time) {
+      this.time = this.shown = this.limit(time);
+      this.slider.value = this.time;
+      this.tell();
+      for (const figure of this.figures) figure.show(this.time);
+    }
+
+    tell() {
+      this.clock.textContent = `${this.time.toFixed(this.stop - this.start < 2 ? 4 : 3)} s`;
+      this.slider.setAttribute("aria-valuetext", this.clock.textContent);
+    }
+
+    zoom(factor) {
+      const whole = this.stop - this.start;
+      const width = Math.min(whole, (this.window[1] - this.window[0]) * factor);
+      const first = clamp(this.time - width / 2, this.start, this.stop - width);
+      this.window = [first, first + width];
+      for (const figure of this.figures) {
+        for (const panel of figure.panels) {
+          panel.zoom(width >= whole ? [panel.start, panel.stop] : this.window);
+        }
+        figure.show(this.shown);
+      }
+    }
+
+    toggle() {
+      const playing = this.play.textContent !== "▶";
+      this.play.textContent = playing ? "▶" : "❚❚";
+      this.play.setAttribute("aria-label", playing ? "Play" : "Pause");
+      this.play.title = playing ? "Play" : "Pause";
+      if (playing) return;
+      const span = this.stop - this.start;
+      const rate = span / clamp(span, 6, 20); // short motions are slowed down, long ones sped up
+      if (this.time >= this.stop - 1e-9) this.set(this.start);
+      let before = null;
+      const step = (now) => {
+        if (this.play.textContent === "▶") return;
+        if (before !== null) this.set(this.time + rate * (now - before) / 1000);
+        before = now;
+        if (this.time >= this.stop) this.toggle(); else requestAnimationFrame(step);
+      };
+      requestAnimationFrame(step);
+    }
+  }
+
+  for (const article of document.querySelectorAll("article[data-times]")) new Case(article);
+})();
