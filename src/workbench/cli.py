@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import os
 import sys
-from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
 
 from workbench._version import __version__
-from workbench.commands.assignments import settings
 from workbench.commands.model import model
+from workbench.commands.run import run
+from workbench.commands.status import status
 from workbench.commands.workspace import workspace
 from workbench.errors import WorkbenchError
 
@@ -27,7 +27,6 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 
-BOUND_FAILED = 1
 BAD_INPUT = 2
 INTERNAL = 3
 INTERRUPTED = 130
@@ -55,58 +54,8 @@ def _root(
     """Validate closed-form dynamics of parallel robots against MuJoCo."""
 
 
-@app.command()
-def run(
-    campaign: Annotated[
-        Path, typer.Argument(metavar="CAMPAIGN", help="Campaign file (TOML), or the name of one that comes along.")
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Run directory; an earlier run in it is replaced. Default: reports/NAME."),
-    ] = None,
-    only: Annotated[list[str] | None, typer.Option(metavar="CASE", help="Run this case only; may be repeated.")] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI; a2*=1.1 scales."),
-    ] = None,
-    model: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="MJCF file in place of the campaign's own.")
-    ] = None,
-    engines: Annotated[
-        str, typer.Option(metavar="LIST", help="mujoco, or mujoco,pinocchio to check the reference by a second engine.")
-    ] = "mujoco",
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Errors only: no power balance, no forward replay, no raw mj_inverse.")
-    ] = False,
-) -> None:
-    """Run a campaign: closed forms against MuJoCo, with a table of errors, a verdict and a report.
-
-    Exit code 0: every bound holds; 1: a bound fails; 2: bad input, and nothing was written.
-    """
-    from workbench.campaign.evidence import Effort
-    from workbench.campaign.run import run_campaign
-    from workbench.console import CaseProgress, print_outcome
-    from workbench.report import build_report
-
-    values, relative = settings(set_ or [])
-    with CaseProgress() as progress:
-        outcome = run_campaign(
-            campaign,
-            out,
-            model=model,
-            only=only or (),
-            settings=values,
-            relative=relative,
-            command=["workbench", *sys.argv[1:]],
-            progress=progress,
-            report=build_report,
-            effort=Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick),
-        )
-    print_outcome(outcome)
-    if not outcome.passed:
-        raise typer.Exit(BOUND_FAILED)
-
-
+app.command()(run)
+app.command()(status)
 app.command()(workspace)
 app.add_typer(model)
 

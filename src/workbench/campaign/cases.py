@@ -25,7 +25,7 @@ from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchEr
 from workbench.mechanisms.assignments import resolve_changes
 from workbench.mechanisms.base import Mechanism
 from workbench.mechanisms.parameters import SIDES
-from workbench.mjcf import load_model
+from workbench.mjcf import LoadedModel, load_model
 from workbench.motion import (
     JointMotion,
     PickAndPlace,
@@ -53,6 +53,8 @@ class Case:
     xd: FloatArray = field(repr=False)
     xdd: FloatArray = field(repr=False)
     """platform motion by the closed form, ``(n, 3)``"""
+    loaded: LoadedModel | None = field(default=None, repr=False)
+    """the model with the overrides, where it is at hand and need not be read again"""
 
     @property
     def name(self) -> str:
@@ -119,6 +121,19 @@ def resolve_cases(
     return cases
 
 
+def resolve_case(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float]) -> Case:
+    """Resolve one case whose parameters are known, and whose candidates are.
+
+    Raises
+    ------
+    ModelError, ParameterError, MotionError
+        As `resolve_cases`, without the case's name.
+    """
+    loaded = load_model(model, overrides)
+    case = _resolve(spec, file, model, overrides, _mechanism_of(loaded, model))
+    return dataclasses.replace(case, loaded=loaded)
+
+
 def layered(*layers: Mapping[str, float]) -> dict[str, float]:
     """Merge parameters, later layers over earlier ones; a later ``m2`` also goes over an earlier ``m2_left``."""
     merged: dict[str, float] = {}
@@ -164,7 +179,10 @@ def locate(campaign_file: Path, name: str, what: str) -> Path:
 
 
 def _mechanism(path: Path, overrides: Mapping[str, float]) -> Mechanism:
-    loaded = load_model(path, overrides)
+    return _mechanism_of(load_model(path, overrides), path)
+
+
+def _mechanism_of(loaded: LoadedModel, path: Path) -> Mechanism:
     if loaded.mechanism is None:
         raise SpecError(f'{path}: <custom> has no <text name="mechanism">, so there is no closed form to validate')
     return loaded.mechanism

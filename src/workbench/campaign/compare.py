@@ -18,6 +18,7 @@ from workbench.campaign.verdict import CONTRAST, FAILURES, kind_of, verdict_of
 from workbench.errors import ArrayError, ModelError, MotionError
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.raw_inverse import raw_mj_inverse
+from workbench.reference.skeleton import skeleton
 
 RAW_INVERSE = "raw mj_inverse"
 """Name of the row that shows MuJoCo's inverse dynamics as it comes."""
@@ -84,7 +85,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         The model's platform is somewhere else than the closed form's.
     """
     motion, mechanism = case.motion, case.mechanism
-    reference = MujocoReference(case.model, threads=1, **case.overrides)
+    reference = MujocoReference(case.model, threads=1, loaded=case.loaded, **case.overrides)
     results: dict[str, ReferenceResult] = {}
     series = _motion_columns(case)
     try:
@@ -116,6 +117,11 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual
     facts = _facts(case, reference, first, rows) | {"evidence": evidence.facts()}
+    if effort.drawing:
+        drawing = skeleton(reference, first.qpos)
+        for point, place in drawing.points.items():
+            series |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
+        facts["drawing"] = drawing.facts()
     return CaseResult(case.name, rows, series, facts)
 
 

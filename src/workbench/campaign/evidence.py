@@ -33,6 +33,8 @@ class Effort:
     engines: tuple[str, ...] = (MUJOCO,)
     budget: bool = True
     """power balance, forward replay and the row of raw `mj_inverse`"""
+    drawing: bool = True
+    """the mechanism's points over time, for drawings of it"""
 
 
 FULL = Effort()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,15 +10,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from workbench.campaign import provenance, store
+from workbench.campaign import store
 from workbench.campaign.cases import Case, resolve_cases, with_unit_hint
 from workbench.campaign.claims import judge_claims
 from workbench.campaign.compare import RAW_DESCRIPTION, RAW_INVERSE, CaseResult, Row, compute_case
 from workbench.campaign.cost import cost_us
 from workbench.campaign.evidence import FULL, Effort, check_engines
+from workbench.campaign.lock import locked
+from workbench.campaign.manifest import describe
 from workbench.campaign.spec import Campaign, load_campaign
-from workbench.errors import WorkbenchError
-from workbench.mechanisms.parameters import stored_names
+from workbench.errors import SpecError, WorkbenchError
 from workbench.staging import check_output, staged
 
 
@@ -82,12 +82,14 @@ def run_campaign(
     """
     started, clock = datetime.now(UTC), time.perf_counter()
     campaign, file = load_campaign(path)
+    if campaign.sweep:
+        raise SpecError(f"{file}: has a sweep; workbench.campaign.sweep.run.run_sweep runs it")
     directory = out or Path("reports") / campaign.name
     check_output(directory, store.RUN)
     check_engines(effort.engines)
     cases = resolve_cases(campaign, file, model, tuple(only), settings, relative)
     results: list[CaseResult] = []
-    with staged(directory) as stage:
+    with locked(directory), staged(directory) as stage:
         for number, case in enumerate(cases):
             if progress:
                 progress(case.name, number, len(cases))
@@ -122,43 +124,13 @@ def _compute(campaign: Campaign, case: Case, file: Path, effort: Effort) -> Case
         raise type(error)(f'{file}: case "{case.name}": {error}', **{**error.facts, "case": case.name}) from found
 
 
-def _shown(path: Path, campaign_file: Path) -> str:
-    """Return a path as others can follow it: from the directory above the campaign's, where it lies below that."""
-    above = campaign_file.resolve().parent.parent
-    found = path.resolve()
-    return found.relative_to(above).as_posix() if found.is_relative_to(above) else path.name
-
-
 def _manifest(
     campaign: Campaign, file: Path, cases: list[Case], facts: Mapping[str, Mapping[str, Any]], rows: list[Row]
 ) -> dict[str, Any]:
     mechanism = cases[0].mechanism
-    model = cases[0].model
-    values = dataclasses.asdict(mechanism.parameters)
     candidates = {c.name: mechanism.candidates[c.name] for c in campaign.candidate}
-    return {
+    return describe(campaign, file, cases[0].model, mechanism) | {
         "format": store.FORMAT,
-        "campaign": campaign.name,
-        "title": campaign.title,
-        "description": campaign.description,
-        "spec_file": _shown(file, file),
-        "spec": campaign.model_dump(),
-        "model": {
-            "file": _shown(model, file),
-            "sha256": provenance.sha256(model.read_bytes()),
-            "mechanism": mechanism.name,
-            "title": mechanism.title,
-            "reference_key": mechanism.reference_key,
-        },
-        "joints": list(mechanism.joints),
-        "coordinate_units": list(mechanism.coordinate_units),
-        "force_units": list(mechanism.force_units),
-        "platform_axes": list(mechanism.platform_axes),
-        "mobility_count": mechanism.mobility_count(),
-        "parameters": [
-            {"name": name, "value": values[name], "unit": info.unit, "meaning": info.meaning, "source": info.source}
-            for name, info in stored_names(mechanism.parameter_table).items()
-        ],
         "candidates": {
             name: {
                 "mass_model": c.mass_model,
@@ -172,7 +144,4 @@ def _manifest(
         "claims": judge_claims(campaign, rows, facts),
         "figures": [kept.model_dump() for figure in campaign.figure if (kept := figure.among(set(facts)))],
         "cases": dict(facts),
-        "versions": provenance.versions(),
-        "machine": provenance.machine(),
-        "git_commit": provenance.git_commit(file.resolve().parent),
     }

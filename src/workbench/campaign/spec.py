@@ -14,6 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
 from workbench.campaign.schema import NAME_RULE, Finite, Name, Strict, Triple, Vector
+from workbench.campaign.sweep.spec import Filter, SweepSpec, Vary
 from workbench.data_files import bundled
 from workbench.errors import SpecError, WorkbenchError, did_you_mean
 
@@ -188,6 +189,13 @@ class Campaign(Strict):
     case: Annotated[list[CaseSpec], Field(min_length=1)]
     claim: list[ClaimSpec] = Field(default_factory=list)
     figure: list[FigureSpec] = Field(default_factory=list)
+    sweep: SweepSpec | None = None
+
+    @model_validator(mode="after")
+    def _one_case_varies(self) -> Campaign:
+        if self.sweep and (len(self.case) != 1 or self.claim or self.figure):
+            raise ValueError("a campaign with a sweep has one case, which varies, and neither claims nor figures")
+        return self
 
 
 def load_campaign(path: str | Path) -> tuple[Campaign, Path]:
@@ -286,6 +294,7 @@ _MOTIONS: dict[str, type[Strict]] = {
 _TAGS = frozenset({*_MOTIONS, "float", "constrained-float"})
 _SECTIONS: dict[str, type[Strict]] = {
     "candidate": CandidateSpec, "case": CaseSpec, "claim": ClaimSpec, "figure": FigureSpec, "measure": Measure,
+    "sweep": SweepSpec, "vary": Vary, "filter": Filter,
 }  # fmt: skip
 
 

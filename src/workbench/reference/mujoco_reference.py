@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
-from workbench.mjcf import custom_text, load_model
+from workbench.mjcf import LoadedModel, custom_text, load_model
 from workbench.reference.closure import Assembly, LoopCloser, constraint_jacobian
 from workbench.reference.engine import Engine, mass_layout, without_bar_inertia
 from workbench.reference.kernels import projection, velocities
@@ -82,6 +82,8 @@ class MujocoReference:
         MJCF file; ``<custom>`` names ``base_body``, ``platform_site`` and ``lumped_bodies``.
     threads
         Threads for MuJoCo's own work; results are the same, bit for bit, for any number.
+    loaded
+        The same model with the same overrides where it is at hand; it becomes the reference's own.
     **parameters
         Overrides by name, SI, as for `workbench.load_mechanism`.
 
@@ -93,8 +95,10 @@ class MujocoReference:
         Unknown parameter or a value it may not have.
     """
 
-    def __init__(self, path: str | Path, *, threads: int = 1, **parameters: float) -> None:
-        loaded = load_model(path, parameters)
+    def __init__(
+        self, path: str | Path, *, threads: int = 1, loaded: LoadedModel | None = None, **parameters: float
+    ) -> None:
+        loaded = loaded or load_model(path, parameters)
         self.file = loaded.file
         self._text = loaded.text
         self._threads = threads

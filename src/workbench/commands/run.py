@@ -1,0 +1,114 @@
+"""``workbench run``: a campaign, of cases or with a sweep."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from workbench.commands.assignments import settings
+from workbench.errors import SpecError
+
+BOUND_FAILED = 1
+
+
+def run(
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN", help="Campaign file (TOML), or the name of one that comes along.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Run directory; an earlier run in it is replaced, a sweep gone on with. Default: reports/NAME.",
+        ),
+    ] = None,
+    only: Annotated[list[str] | None, typer.Option(metavar="CASE", help="Run this case only; may be repeated.")] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI; a2*=1.1 scales."),
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="MJCF file in place of the campaign's own.")
+    ] = None,
+    engines: Annotated[
+        str, typer.Option(metavar="LIST", help="mujoco, or mujoco,pinocchio to check the reference by a second engine.")
+    ] = "mujoco",
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Errors only: no power balance, no forward replay, no raw mj_inverse.")
+    ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check everything; print cases, samples, time and disk; write nothing.")
+    ] = False,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Workers of a sweep. Default: one per core.")] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Start a sweep over; drops what is finished.")] = False,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Compute cases of a sweep again that did not pass.")
+    ] = False,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            envvar="DASK_SCHEDULER_ADDRESS",
+            help="Compute a sweep on a Dask cluster, tcp://host:8786, in place of local workers.",
+        ),
+    ] = None,
+) -> None:
+    """Run a campaign: closed forms against MuJoCo, with a table of errors, a verdict and a report.
+
+    Exit code 0: every bound holds; 1: a bound fails or a case of a sweep does not pass; 2: bad input.
+    """
+    from workbench.campaign.evidence import Effort
+    from workbench.campaign.run import run_campaign
+    from workbench.campaign.spec import load_campaign
+    from workbench.campaign.sweep.run import SweepInterrupted, SweepOptions
+    from workbench.commands.sweeps import dry_run as print_dry_run
+    from workbench.commands.sweeps import run_and_print
+    from workbench.console import CaseProgress, print_outcome
+    from workbench.report import build_report
+
+    values, relative = settings(set_ or [])
+    effort = Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick)
+    command = ["workbench", *sys.argv[1:]]
+    spec, file = load_campaign(campaign)
+    if (spec.sweep or dry_run) and (only or relative):
+        what = "--only" if only else f'--set "{relative[0]}"'
+        raise SpecError(f"{campaign}: {what} does not go with {'a sweep' if spec.sweep else '--dry-run'}")
+    if dry_run:
+        print_dry_run(spec, file, model, values, effort, jobs)
+        return
+    if spec.sweep:
+        try:
+            passed = run_and_print(
+                spec,
+                file,
+                out,
+                model=model,
+                settings=values,
+                command=command,
+                effort=effort,
+                options=SweepOptions(jobs, scheduler, fresh, retry_failed),
+            )
+        except SweepInterrupted as stop:
+            typer.echo(f"workbench: {stop}", err=True)
+            raise
+    else:
+        with CaseProgress() as progress:
+            outcome = run_campaign(
+                campaign,
+                out,
+                model=model,
+                only=only or (),
+                settings=values,
+                relative=relative,
+                command=command,
+                progress=progress,
+                report=build_report,
+                effort=effort,
+            )
+        print_outcome(outcome)
+        passed = outcome.passed
+    if not passed:
+        raise typer.Exit(BOUND_FAILED)

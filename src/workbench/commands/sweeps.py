@@ -1,0 +1,163 @@
+"""What ``workbench run`` does for campaigns with a sweep: call, show progress, print the outcome; and dry runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from rich import box
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+from workbench.campaign.evidence import Effort, check_engines
+from workbench.campaign.spec import Campaign
+from workbench.campaign.sweep.estimate import estimate
+from workbench.campaign.sweep.progress import Snapshot
+from workbench.campaign.sweep.run import SweepOptions, SweepOutcome, run_sweep
+from workbench.console import err, out
+
+LINE_EVERY_S = 10.0
+"""Seconds between lines of progress where there is no terminal."""
+
+SHOWN_DRIVERS = 6
+
+
+def duration(seconds: float) -> str:
+    """Say how long something takes."""
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    if seconds < 3600:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h"
+
+
+def size(bytes_: float) -> str:
+    """Say how much room something takes."""
+    for unit in ("kB", "MB", "GB"):
+        bytes_ /= 1000
+        if bytes_ < 1000 or unit == "GB":
+            break
+    return f"{bytes_:.3g} {unit}"
+
+
+def plain_line(found: Snapshot) -> str:
+    """One line of progress."""
+    troubles = [f"{n} {status}" for status, n in found.counts.items() if n and status != "passed"]
+    rate = [f"{found.rate:.1f} cases/s"] if found.rate else []
+    left = [f"{duration(found.remaining_s)} left"] if found.remaining_s else []
+    return ", ".join([f"[{found.done}/{found.total}]", *rate, *left, *troubles]).replace("],", "]", 1)
+
+
+class SweepProgress:
+    """A bar with rate and time left on a terminal, a plain line now and then elsewhere."""
+
+    def __init__(self) -> None:
+        self._bar = Progress(
+            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[note]}"),
+            console=err, transient=True, disable=not err.is_terminal,
+        )  # fmt: skip
+        self._task: Any = None
+        self._said = float("-inf")
+
+    def __enter__(self) -> Self:
+        """Start the bar."""
+        self._bar.start()
+        self._task = self._bar.add_task("cases", total=None, note="")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Take the bar away."""
+        self._bar.stop()
+
+    def __call__(self, found: Snapshot) -> None:
+        """Show where the sweep stands."""
+        if err.is_terminal:
+            note = plain_line(found).partition("] ")[2]
+            self._bar.update(self._task, completed=found.done, total=found.total, note=note)
+        elif time.monotonic() - self._said >= LINE_EVERY_S or found.done == found.total:
+            self._said = time.monotonic()
+            err.print(plain_line(found), markup=False)
+
+
+def dry_run(
+    campaign: Campaign, file: Path, model: Path | None, settings: Mapping[str, float], effort: Effort, jobs: int | None
+) -> None:
+    """Print what a run would take; nothing is written."""
+    check_engines(effort.engines)
+    found = estimate(campaign, file, model, settings, effort, jobs)
+    out.print(Text(f"{campaign.name}: {found.cases} cases, {found.samples} samples"))
+    workers = "worker" if found.jobs == 1 else "workers"
+    out.print(Text(f"  time: about {duration(found.seconds)} with {found.jobs} {workers}"))
+    running = f", {size(found.bytes_while_running)} while it runs" if campaign.sweep else ""
+    out.print(Text(f"  disk: about {size(found.bytes_at_end)}{running}"))
+    if campaign.sweep:
+        parts = [f"{found.tried_filtered} left out by the filter", f"{found.tried_failed} not passed"]
+        out.print(Text(f"  of {found.tried} cases tried: {', '.join(parts)}"))
+
+
+def run_and_print(
+    campaign: Campaign,
+    file: Path,
+    directory: Path | None,
+    *,
+    model: Path | None,
+    settings: Mapping[str, float],
+    command: list[str],
+    effort: Effort,
+    options: SweepOptions,
+) -> bool:
+    """Run a sweep and print its outcome; return whether every case passed."""
+    check_engines(effort.engines)
+    with SweepProgress() as progress:
+        outcome = run_sweep(
+            campaign,
+            file,
+            directory or Path("reports") / campaign.name,
+            model=model,
+            settings=settings,
+            command=command,
+            show=progress,
+            effort=effort,
+            options=options,
+        )
+    print_sweep(outcome)
+    return outcome.passed
+
+
+def print_sweep(outcome: SweepOutcome) -> None:
+    """Print counts, errors over all cases, what drives them, and the verdict."""
+    summary = outcome.summary
+    table = Table(title="Errors over all cases, largest joint", title_justify="left", box=box.SIMPLE_HEAD)
+    for column in ("candidate", "MuJoCo model", "median", "95 %", "largest", "case"):
+        table.add_column(column, justify="right" if column in ("median", "95 %", "largest") else "left")
+    for row in summary["errors"]:
+        if row["joint"] == "any" and row["cases"]:
+            show = _percent if row["kind"] == "modelling" else _scientific
+            numbers = (row["quantiles"]["0.5"], row["quantiles"]["0.95"], row["max"])
+            table.add_row(row["candidate"], row["reference"], *map(show, numbers), row["worst_case"])
+    out.print(table)
+    drivers = summary["drivers"][:SHOWN_DRIVERS]
+    if drivers:
+        listed = ", ".join(f"{d['key']} {d['rank_correlation']:+.2f}" for d in drivers)
+        out.print(Text(f"Modelling error of {drivers[0]['candidate']} rises with (rank correlation): {listed}"))
+    for reason in summary["reasons"]:
+        if reason["status"] != "filtered":
+            out.print(Text(f"{reason['status']} ({reason['cases']}): {reason['example']}"), style="yellow")
+    counts = ", ".join(f"{n} {status}" for status, n in summary["counts"].items() if n)
+    verdict = "PASSED" if outcome.passed else "FAILED"
+    out.print(Text(f"{verdict}: {counts}, of {summary['cases']} cases.", style="green" if outcome.passed else "red"))
+    out.print(Text(f"Written to {outcome.directory}: sweep.json, cases, summary"), soft_wrap=True)
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.2f} %"
+
+
+def _scientific(value: float) -> str:
+    return f"{value:.1e}"
