@@ -20,7 +20,7 @@ MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("cli", "commands", "console"),
-    ("report",),
+    ("report", "compare", "rendering"),
     ("campaign", "workspace"),
     ("reference",),
     ("mjcf",),
@@ -29,8 +29,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
 )
 """Top to bottom; a module may import its own layer and those below. The package's own __init__ may import any."""
 
-ENGINE_LAYERS = ("mjcf", "reference")
-"""The only places that may import mujoco."""
+ENGINE_LAYERS = ("mjcf", "reference", "rendering")
+"""The only places that may import mujoco; rendering, since MuJoCo draws the models."""
 
 NEUTRAL_MECHANISM_MODULES = ("workbench.mechanisms.base", "workbench.mechanisms.parameters")
 """What the reference may see of the closed forms: the interface, no formula."""

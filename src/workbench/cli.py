@@ -12,6 +12,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from workbench._version import __version__
+from workbench.commands.compare import compare
 from workbench.commands.model import model
 from workbench.commands.run import run
 from workbench.commands.status import status

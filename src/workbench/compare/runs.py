@@ -1,0 +1,130 @@
+"""Compare two run directories: inputs, outcomes and errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from workbench.compare.errors import ErrorChange, match_errors
+from workbench.report.load import load_run
+from workbench.report.manifest import Manifest
+
+MISSING = None
+"""Stands for what a run does not have, as in JSON."""
+
+LABELS = ("name", "id")
+"""Keys by which entries of a list are told apart, so that an entry put in between does not shift all others."""
+
+PROSE = frozenset({"title", "description", "text", "note", "source"})
+"""Keys of a campaign that say something and change nothing."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Something that two runs do not share."""
+
+    group: str
+    """``model``, ``parameter``, ``version``, ``machine``, ``campaign``, ``run`` or ``outcome``"""
+    what: str
+    before: Any
+    after: Any
+
+
+@dataclass(frozen=True)
+class RunComparison:
+    """Two runs side by side."""
+
+    inputs: tuple[Difference, ...]
+    outcomes: tuple[Difference, ...]
+    """status of cases, mobility, claims"""
+    errors: tuple[ErrorChange, ...]
+    joints: tuple[str, ...]
+
+
+def compare_runs(before: Path, after: Path) -> RunComparison:
+    """Compare two run directories.
+
+    Parameters
+    ----------
+    before, after
+        Directories that ``workbench run`` wrote.
+
+    Raises
+    ------
+    OutputError
+        One of them cannot be read; the message names file and key.
+    """
+    old, new = load_run(before), load_run(after)
+    return RunComparison(
+        inputs=tuple(_inputs(old.manifest, new.manifest)),
+        outcomes=tuple(_outcomes(old.manifest, new.manifest)),
+        errors=tuple(match_errors(old.rows, new.rows)),
+        joints=new.manifest.joints,
+    )
+
+
+def _inputs(old: Manifest, new: Manifest) -> Iterator[Difference]:
+    for key in ("mechanism", "file", "sha256"):
+        yield from differences("model", key, getattr(old.model, key), getattr(new.model, key))
+    names = [{p.name: p.value for p in manifest.parameters} for manifest in (old, new)]
+    yield from differences("parameter", "", *names)
+    shared = [name for name in new.cases if name in old.cases]
+    for name in shared:
+        yield from differences("parameter", f'case "{name}"', old.cases[name].parameters, new.cases[name].parameters)
+    for group, field in (("version", "versions"), ("machine", "machine"), ("campaign", "spec")):
+        yield from differences(group, "", getattr(old, field), getattr(new, field))
+    for field in ("campaign", "engines", "budget", "git_commit"):
+        yield from differences("run", field.replace("_", " "), getattr(old, field), getattr(new, field))
+
+
+def _outcomes(old: Manifest, new: Manifest) -> Iterator[Difference]:
+    for name in dict.fromkeys([*old.cases, *new.cases]):
+        one, two = old.cases.get(name), new.cases.get(name)
+        if one is None or two is None:
+            yield Difference("outcome", f'case "{name}"', one and one.status, two and two.status)
+            continue
+        for field in ("status", "mobility", "rank", "redundant_rows", "idle_freedoms"):
+            yield from differences("outcome", f'case "{name}" {field}', getattr(one, field), getattr(two, field))
+    claims = [{claim.id: _word(claim.holds) for claim in manifest.claims} for manifest in (old, new)]
+    yield from differences("outcome", "claim", *claims)
+
+
+def _word(holds: bool | None) -> str:
+    return "undecided" if holds is None else "holds" if holds else "does not hold"
+
+
+def differences(group: str, what: str, before: Any, after: Any) -> Iterator[Difference]:
+    """Walk through two nested values; yield the places where they differ."""
+    one, two = _labelled(before), _labelled(after)
+    if isinstance(one, Mapping) and isinstance(two, Mapping):
+        for key in dict.fromkeys([*one, *two]):
+            if key not in PROSE:
+                yield from differences(group, f"{what} {key}".strip(), one.get(key, MISSING), two.get(key, MISSING))
+    elif not _same(before, after):
+        yield Difference(group, what, before, after)
+
+
+def _labelled(value: Any) -> Any:
+    """Turn a list of named entries into a mapping by name; candidates may share a name and differ by reference."""
+    if isinstance(value, Sequence) and not isinstance(value, str) and value:
+        for label in LABELS:
+            if all(isinstance(entry, Mapping) and label in entry for entry in value):
+                keys = [f'"{entry[label]}"' for entry in value]
+                if len(set(keys)) < len(keys):
+                    keys = [
+                        f"{key} against {entry.get('reference', '')}" for key, entry in zip(keys, value, strict=True)
+                    ]
+                if len(set(keys)) == len(keys):
+                    return dict(zip(keys, value, strict=True))
+    return value
+
+
+def _same(one: Any, two: Any) -> bool:
+    if isinstance(one, float) and isinstance(two, float) and math.isnan(one) and math.isnan(two):
+        return True
+    if isinstance(one, list | tuple) and isinstance(two, list | tuple):
+        return len(one) == len(two) and all(map(_same, one, two))
+    return bool(one == two)
