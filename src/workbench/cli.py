@@ -14,7 +14,6 @@ import typer
 from workbench._version import __version__
 from workbench.commands.compare import compare
 from workbench.commands.model import model
-from workbench.commands.report import report
 from workbench.commands.run import run
 from workbench.commands.status import status
 from workbench.commands.workspace import workspace
@@ -56,7 +55,6 @@ def _root(
     """Validate closed-form dynamics of parallel robots against MuJoCo."""
 
 
-app.command()(report)
 app.command()(run)
 app.command()(status)
 app.command()(workspace)
