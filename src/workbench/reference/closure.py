@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
-from workbench.reference.engine import Engine
-from workbench.reference.kernels import closure_steps, integrate, rows_sample
+from workbench.reference.engine import Engine, Evaluator
+from workbench.reference.kernels import integrate, newton_step, predict
+from workbench.reference.rows import constraint_rows
 from workbench.reference.structure import Structure
+from workbench.reference.tables import tables_of
 
 CLOSED = 1e-13
 """Largest residual of a closed loop, metres (for turns: radians)."""
@@ -27,6 +28,9 @@ CORRECTION = 0.1
 
 LONGEST_STEP = 0.2
 """rad or m, over all joints: a longer step can land on another branch and still look like a good one."""
+
+ALMOST = 1.0 - 1e-9
+"""Steps are cut to this part of the longest, so that rounding does not make them longer."""
 
 NEGLIGIBLE = 1e-7
 """Corrections below this (rad, m) are accepted whatever the step: they are rounding, not another branch."""
@@ -42,16 +46,50 @@ FREE_STEPS = 60
 LONGEST_FREE_STEP = 0.2
 """rad or m: damped, so that an open home pose closes on the branch that it is nearest to."""
 
-SEED_SPACING = 24
-"""One sample in so many is reached from the home pose; the others start from the nearest of those."""
+SEED_SPACINGS = (576, 24, 1)
+"""One sample in so many, each level reached from the nearest of the level before, the first from the home pose."""
 
 
 @dataclass(frozen=True)
 class Assembly:
-    """Closed configurations ``(n, nq)`` and their residuals ``(n,)`` in metres."""
+    """Closed configurations of n samples and what is known of the loops there."""
 
     qpos: FloatArray
+    """``(n, nq)``"""
     residual: FloatArray
+    """``(n,)`` largest open loop coordinate, m (rad for turns)"""
+    tangent: FloatArray
+    """``(n, nv, na)`` velocities per unit actuated velocity"""
+    rank: np.ndarray
+    """``(n,)`` rank of the loop constraints on the passive freedoms"""
+    condition: FloatArray
+    """``(n,)`` estimate of their condition number"""
+    weakest: np.ndarray
+    """``(n,)`` velocity address of the freedom that they determine worst"""
+
+    @staticmethod
+    def empty(samples: int, nq: int, nv: int, actuated: int) -> Assembly:
+        """Nothing closed yet."""
+        return Assembly(
+            qpos=np.zeros((samples, nq)),
+            residual=np.full(samples, np.inf),
+            tangent=np.zeros((samples, nv, actuated)),
+            rank=np.zeros(samples, dtype=np.int64),
+            condition=np.full(samples, np.inf),
+            weakest=np.zeros(samples, dtype=np.int64),
+        )
+
+    def at(self, rows: np.ndarray | slice) -> Assembly:
+        """Some of the samples; with a slice, views."""
+        return Assembly(*(array[rows] for array in self._arrays()))
+
+    def put(self, rows: np.ndarray, other: Assembly, chosen: np.ndarray | slice = slice(None)) -> None:
+        """Overwrite *rows* by the *chosen* samples of another assembly."""
+        for mine, others in zip(self._arrays(), other._arrays(), strict=True):
+            mine[rows] = others[chosen]
+
+    def _arrays(self) -> tuple[np.ndarray, ...]:
+        return self.qpos, self.residual, self.tangent, self.rank, self.condition, self.weakest
 
 
 class LoopCloser:
@@ -60,17 +98,11 @@ class LoopCloser:
     def __init__(self, engine: Engine, structure: Structure) -> None:
         self.engine = engine
         self.structure = structure
-        model = engine.model
-        ball = mujoco.mjtJoint.mjJNT_BALL.value
-        self.joints = (
-            (np.asarray(model.jnt_type) == ball).astype(np.int64),
-            np.asarray(model.jnt_qposadr).astype(np.int64),
-            np.asarray(model.jnt_dofadr).astype(np.int64),
-        )
+        self.tables = tables_of(engine.model, structure)
+        self.joints = self.tables.joints
         home = structure.home_qpos[None, :]
-        q_home = home[:, structure.actuated_qpos]
-        closed, done, residual = self._newton(home.copy(), q_home, np.zeros(1, dtype=np.int64))
-        if not done[0]:
+        found = self._newton_alone(home)
+        if not found.residual[0] <= CLOSED:
             # edited lengths can put the file's home pose out of reach: move the actuated joints too, but little
             closed, residual = self._close_freely(home.copy())
             if not residual[0] <= CLOSED:
@@ -80,7 +112,9 @@ class LoopCloser:
                     file=structure.file,
                     value=float(residual[0]),
                 )
-        self.home = closed[0]
+            found = self._newton_alone(closed)
+        self._home = found
+        self.home = found.qpos[0]
 
     def close(self, q: FloatArray) -> Assembly:
         """Close the loops for actuated coordinates ``(n, na)``, SI, any order of samples.
@@ -91,55 +125,59 @@ class LoopCloser:
             Naming the first sample that cannot be reached on the home branch, its coordinates and the open loop.
         """
         n = len(q)
-        qpos = np.tile(self.home, (n, 1))
-        residual = np.full(n, np.inf)
-        seeds = np.arange(0, n, SEED_SPACING)
-        if len(seeds):
-            qpos[seeds], residual[seeds] = self._reach(q[seeds], np.tile(self.home, (len(seeds), 1)), seeds)
-        others = np.setdiff1d(np.arange(n), seeds)
-        if len(others):
-            scale = np.maximum(np.ptp(q, axis=0), 1e-9)
-            nearest = _nearest(q[others] / scale, q[seeds] / scale)
-            qpos[others], residual[others] = self._reach(q[others], qpos[seeds[nearest]], others)
-        return Assembly(qpos, residual)
+        found = self._nothing(n)
+        known = np.zeros(0, dtype=np.int64)
+        scale = np.maximum(np.ptp(q, axis=0), 1e-9) if n else np.ones(q.shape[1])
+        for spacing in SEED_SPACINGS:
+            wanted = np.setdiff1d(np.arange(0, n, spacing), known)
+            if not len(wanted):
+                continue
+            if len(known):
+                nearest = known[_nearest(q[wanted] / scale, q[known] / scale)]
+                self._reach(q, wanted, found, nearest, found)
+            else:
+                self._reach(q, wanted, self._home, np.zeros(len(wanted), dtype=np.int64), found)
+            known = np.union1d(known, wanted)
+        return found
 
-    def _reach(self, target: FloatArray, start: FloatArray, names: np.ndarray) -> tuple[FloatArray, FloatArray]:
-        """Continuation from *start* configurations to *target* actuated coordinates."""
-        structure = self.structure
-        n = len(target)
-        qpos = start.copy()
-        residual = np.zeros(n)
-        origin = start[:, structure.actuated_qpos]
-        done = np.zeros(n)
-        step = np.ones(n)
-        active = np.arange(n)
+    def _reach(self, q: FloatArray, wanted: np.ndarray, known: Assembly, origins: np.ndarray, found: Assembly) -> None:
+        """Continuation from rows *origins* of closed configurations to rows *wanted* of *q* and *found*."""
+
+        def block(evaluator: Evaluator, part: slice) -> None:
+            names = wanted[part]
+            found.put(names, self._continue(evaluator, known.at(origins[part]), q[names], names))
+
+        self.engine.in_blocks(block, len(wanted))
+
+    def _continue(self, evaluator: Evaluator, here: Assembly, target: FloatArray, names: np.ndarray) -> Assembly:
+        """Follow straight lines in the actuated coordinates from closed configurations to *target* ``(k, na)``."""
+        origin = here.qpos[:, self.structure.actuated_qpos]
+        way = target - origin
+        done, step = np.zeros(len(target)), np.ones(len(target))
+        active = np.arange(len(target))
         while len(active):
-            here, way = qpos[active], target[active] - origin[active]
-            part = np.minimum(step[active], 1.0 - done[active])
-            change = way * part[:, None]
-            aim = np.where(
-                (done[active] + part >= 1.0)[:, None],
-                target[active],
-                origin[active] + way * (done[active] + part)[:, None],
-            )
-            predicted, moved = self._step(here, change)
-            predicted[:, structure.actuated_qpos] = aim
-            closed, success, error = self._newton(predicted, aim, np.arange(len(active)))
-            correction = self._distance(closed, predicted)
+            speed = np.linalg.norm(np.matmul(here.tangent[active], way[active, :, None])[:, :, 0], axis=1)
+            with np.errstate(divide="ignore"):
+                longest = ALMOST * LONGEST_STEP / speed
+            part = np.minimum(np.minimum(step[active], 1.0 - done[active]), longest)
+            last = (done[active] + part >= 1.0)[:, None]
+            aim = np.where(last, target[active], origin[active] + way[active] * (done[active] + part)[:, None])
+            moved, predicted = self._predict(here, active, way[active] * part[:, None])
+            predicted[:, self.structure.actuated_qpos] = aim
+            closed = self._newton(evaluator, predicted)
+            correction = np.sqrt(np.sum((closed.qpos - predicted) ** 2, axis=1))
             small = correction <= np.maximum(CORRECTION * moved, NEGLIGIBLE)
-            accepted = success & small & (moved <= LONGEST_STEP)
-            moving = active[accepted]
-            qpos[moving] = closed[accepted]
-            residual[moving] = error[accepted]
-            done[moving] += part[accepted]
-            step[moving] *= 2.0
+            accepted = (closed.residual <= CLOSED) & small & (moved <= LONGEST_STEP)
+            here.put(active[accepted], closed, accepted)
+            done[active[accepted]] += part[accepted]
+            step[active[accepted]] *= 2.0
             refused = active[~accepted]
             step[refused] = 0.5 * part[~accepted]
-            stuck = refused[step[refused] < SMALLEST_STEP]
-            if len(stuck):
-                self._refuse(int(names[stuck[0]]), target[stuck[0]], qpos[stuck[0]])
-            active = active[(done[active] < 1.0)]
-        return qpos, residual
+            blocked = active[np.where(accepted, longest, step[active]) < SMALLEST_STEP]
+            if len(blocked):
+                self._refuse(int(names[blocked[0]]), target[blocked[0]], here.qpos[blocked[0]])
+            active = active[done[active] < 1.0]
+        return here
 
     def _close_freely(self, qpos: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Close one configuration ``(1, nq)`` by least-norm Newton steps on all joints, the actuated ones included."""
@@ -152,59 +190,43 @@ class LoopCloser:
                 break
             step = -np.linalg.lstsq(jacobian, open_by, rcond=1e-9)[0]
             step *= min(1.0, LONGEST_FREE_STEP / max(float(np.linalg.norm(step)), 1e-300))
-            integrate(qpos[0].copy(), step, *self.joints, qpos[0])
+            integrate(qpos[0], step, self.joints, qpos[0])
         return qpos, residual
 
-    def _step(self, qpos: FloatArray, change: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Tangent predictor: configurations after a change of the actuated coordinates, and the distance moved."""
-        steps, _, _ = self._linear(qpos, change, np.arange(len(qpos)))
-        out = np.empty_like(qpos)
-        for i in range(len(qpos)):
-            integrate(qpos[i], steps[i], *self.joints, out[i])
-        return out, np.sqrt(np.sum(steps**2, axis=1))
+    def _predict(self, here: Assembly, rows: np.ndarray, change: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Tangent predictor: distance moved by a change of the actuated coordinates, and where that leads."""
+        moved, out = np.empty(len(rows)), np.empty((len(rows), here.qpos.shape[1]))
+        predict(here.qpos[rows], here.tangent[rows], change, self.joints, out, moved)
+        return moved, out
 
-    def _newton(self, qpos: FloatArray, q: FloatArray, ids: np.ndarray) -> tuple[FloatArray, np.ndarray, FloatArray]:
-        """Newton on the passive joints; returns configurations, success and residuals."""
-        qpos = qpos.copy()
-        qpos[:, self.structure.actuated_qpos] = q
-        still = np.zeros((len(qpos), len(self.structure.actuated)))
-        residual = np.full(len(qpos), np.inf)
-        best = residual.copy()
-        kept = qpos.copy()
-        active = ids
+    def _newton(self, evaluator: Evaluator, start: FloatArray) -> Assembly:
+        """Newton on the passive joints of up to a block of configurations; the actuated coordinates stay."""
+        count = len(start)
+        found = self._nothing(count)
+        qpos = evaluator.qpos
+        qpos[:count] = start
+        # the floor: a closed sample gets one more step, which takes it to rounding; then it stays
+        limits = (CLOSED, 0.01 * CLOSED, ASTRAY)
+        active = np.arange(count)
         for _ in range(NEWTON_STEPS):
-            steps, now, _ = self._linear(qpos, still, active)
-            residual[active] = now[active]
-            better = active[residual[active] < best[active]]
-            kept[better] = qpos[better]
-            best[better] = residual[better]
-            # a closed sample gets one more step, which takes it to the floor of rounding; then it stays
-            active = active[
-                (residual[active] > 0.01 * CLOSED) & (residual[active] < ASTRAY) & (residual[active] <= best[active])
-            ]
+            poses = evaluator.place(active)
+            active = newton_step(
+                active, self.tables.closures, self.joints, self.tables.split, poses.tables, limits, qpos, found.qpos,
+                found.residual, found.tangent, found.rank, found.condition, found.weakest,
+            )  # fmt: skip
             if not len(active):
                 break
-            for i in active:
-                integrate(qpos[i].copy(), steps[i], *self.joints, qpos[i])
-        return kept, best <= CLOSED, best
+        return found
 
-    def _linear(
-        self, qpos: FloatArray, change: FloatArray, ids: np.ndarray
-    ) -> tuple[FloatArray, FloatArray, np.ndarray]:
-        structure = self.structure
-        n = len(qpos)
-        steps, residuals, ranks = np.zeros((n, self.engine.model.nv)), np.full(n, np.inf), np.zeros(n, dtype=np.int64)
-        poses = self.engine.poses(qpos, None if len(ids) == n else ids)
-        closure_steps(
-            ids, poses.cdof, poses.com, structure.moves, structure.root, structure.blocks, structure.block_rows,
-            structure.polynomials, poses.site_xpos, poses.site_xquat, poses.anchors, qpos, self.joints,
-            structure.passive, structure.actuated, change, steps, residuals, ranks,
-        )  # fmt: skip
-        return steps, residuals, ranks
+    def _newton_alone(self, qpos: FloatArray) -> Assembly:
+        """`_newton` on one configuration ``(1, nq)``, outside of a block."""
+        results: list[Assembly] = []
+        self.engine.in_blocks(lambda evaluator, _: results.append(self._newton(evaluator, qpos)), 1)
+        return results[0]
 
-    def _distance(self, one: FloatArray, two: FloatArray) -> FloatArray:
-        difference: FloatArray = np.sqrt(np.sum((one - two) ** 2, axis=1))
-        return difference
+    def _nothing(self, samples: int) -> Assembly:
+        model = self.engine.model
+        return Assembly.empty(samples, model.nq, model.nv, len(self.structure.actuated))
 
     def _refuse(self, sample: int, q: FloatArray, nearest: FloatArray) -> None:
         reached = nearest[self.structure.actuated_qpos]
@@ -233,13 +255,9 @@ def constraint_jacobian(
     engine: Engine, structure: Structure, joints: tuple[np.ndarray, ...], qpos: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Constraint Jacobian ``(m, nv)``, spin rows last, and residual ``(m,)`` of one configuration ``(1, nq)``."""
-    poses = engine.poses(qpos)
+    poses, tables = engine.poses(qpos), tables_of(engine.model, structure)
     jacobian, residual = np.zeros((structure.rows, poses.cdof.shape[1])), np.zeros(structure.rows)
-    rows_sample(
-        poses.cdof[0], poses.com[0], structure.moves, structure.root, structure.blocks, structure.block_rows,
-        structure.polynomials, poses.site_xpos[0], poses.site_xquat[0], poses.anchors[0], qpos[0][joints[1]], joints[2],
-        jacobian, residual,
-    )  # fmt: skip
+    constraint_rows(tables.closures, tables.joints, qpos[0], *(array[0] for array in poses.tables), jacobian, residual)
     return jacobian, residual
 
 

@@ -1,7 +1,16 @@
-"""MuJoCo evaluated on many samples at once: the only calls of the engine's forward pipeline."""
+"""MuJoCo evaluated on many samples at once: the only calls of the engine's forward pipeline.
+
+Samples are evaluated in blocks that fit a processor's cache, whatever the size of a batch: memory stays small, and a
+block's results do not depend on which thread computes it.
+"""
 
 from __future__ import annotations
 
+import copy
+import os
+import queue
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import mujoco
@@ -9,10 +18,16 @@ import numpy as np
 from mujoco.batch import Batch
 
 from workbench.arrays import FloatArray
+from workbench.errors import ParameterError
 
 LUMPED_INERTIA = 2e-15
 """kg m^2: what stands for "no rotational inertia"; MuJoCo refuses less than 1e-15. Against the smallest bar of the two
 papers (1e-3 kg m^2) it is worth 1e-12."""
+
+BLOCK = 512
+"""Samples evaluated at a time; some 3 kB each."""
+
+MOST_THREADS = 256
 
 
 def without_bar_inertia(text: str, bodies: tuple[str, ...]) -> mujoco.MjModel:
@@ -36,7 +51,7 @@ def without_bar_inertia(text: str, bodies: tuple[str, ...]) -> mujoco.MjModel:
 
 @dataclass(frozen=True)
 class Poses:
-    """Position-dependent quantities of n configurations, as MuJoCo computes them."""
+    """Position-dependent quantities of a block of configurations, as MuJoCo computes them."""
 
     cdof: FloatArray
     com: FloatArray
@@ -44,55 +59,124 @@ class Poses:
     site_xquat: FloatArray
     anchors: FloatArray
 
+    @property
+    def tables(self) -> tuple[FloatArray, ...]:
+        """The arrays as the kernels take them."""
+        return self.cdof, self.com, self.site_xpos, self.site_xquat, self.anchors
+
 
 @dataclass(frozen=True)
 class Dynamics:
-    """Velocity-dependent quantities and inertia of n states."""
+    """Velocity-dependent quantities and inertia of a block of states."""
 
     cdof_dot: FloatArray
     mass: FloatArray
+    """lower triangle of the mass matrix, ``(n, nM)``, in the sparse layout of the model"""
     bias: FloatArray
-    """Coriolis, centrifugal and gravity forces less passive ones (damping), ``(n, nv)``"""
-    body_xpos: FloatArray
+    """Coriolis, centrifugal and gravity forces, ``(n, nv)``"""
+    passive: FloatArray
+    """damping, ``(n, nv)``"""
     body_com: FloatArray
-    inertia_frame: FloatArray
     energy: FloatArray
     """potential and kinetic, ``(n, 2)``, J"""
 
+    @property
+    def tables(self) -> tuple[FloatArray, ...]:
+        """The arrays as the kernels take them."""
+        return self.cdof_dot, self.mass, self.bias, self.passive, self.body_com
+
+
+POSES = ("cdof", "subtree_com", "site_xpos", "site_xquat", "xanchor")
+DYNAMICS = ("cdof_dot", "M", "qfrc_bias", "qfrc_passive", "xipos", "energy")
+
+
+class Evaluator:
+    """Evaluates up to `BLOCK` samples at a time; one thread's own."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        # constraint forces are solved for elsewhere, so the engine need not set them up; nothing else depends on this
+        flags = mujoco.mjtDisableBit
+        lean = copy.copy(model)
+        lean.opt.disableflags |= flags.mjDSBL_CONSTRAINT.value | flags.mjDSBL_SENSOR.value
+        self._still = Batch(lean, BLOCK, 1)
+        self._still_poses = Poses(*(self._still.bind(name) for name in POSES))
+        self.qpos: FloatArray = self._still.qpos
+        """the configurations that `place` evaluates, ``(BLOCK, nq)``, to be written into"""
+        lean = copy.copy(lean)
+        lean.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
+        self._moving = Batch(lean, BLOCK, 1)
+        self._moving_poses = Poses(*(self._moving.bind(name) for name in POSES))
+        self._dynamics = Dynamics(*(self._moving.bind(name) for name in DYNAMICS))
+        self._moving_qpos, self._moving_qvel = self._moving.qpos, self._moving.qvel
+        self._all = np.arange(BLOCK, dtype=np.int32)
+
+    def place(self, ids: np.ndarray) -> Poses:
+        """Evaluate positions of the listed rows of `qpos`; the arrays are valid until the next call."""
+        self._still.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
+        return self._still_poses
+
+    def move(self, qpos: FloatArray, qvel: FloatArray) -> tuple[Poses, Dynamics]:
+        """Evaluate states ``(k, nq)``, ``(k, nv)``, k <= `BLOCK`; the arrays are valid until the next call."""
+        count = len(qpos)
+        self._moving_qpos[:count] = qpos
+        self._moving_qvel[:count] = qvel
+        self._moving.forward(self._all[:count], stage=mujoco.mjtStage.mjSTAGE_VEL.value)
+        return self._moving_poses, self._dynamics
+
 
 class Engine:
-    """A model with batches of the sizes asked for; results do not depend on the number of threads."""
+    """A model and its evaluators; results do not depend on the number of threads."""
 
     def __init__(self, model: mujoco.MjModel, threads: int = 1) -> None:
+        if not 1 <= threads <= MOST_THREADS:
+            raise ParameterError(f"threads = {threads}; allowed: 1 to {MOST_THREADS}", value=threads)
         self.model = model
-        self.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
         self.threads = threads
-        self._batch: Batch | None = None
+        self._idle: queue.SimpleQueue[Evaluator] = queue.SimpleQueue()
+        self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
-    def _for(self, samples: int) -> Batch:
-        if self._batch is None or self._batch.nsim != samples:
-            self._batch = Batch(self.model, samples, self.threads)
-        return self._batch
+    def poses(self, qpos: FloatArray) -> Poses:
+        """Evaluate positions of a few configurations ``(k, nq)``, k <= `BLOCK`; the result is a copy."""
+        evaluator = self._take()
+        evaluator.qpos[: len(qpos)] = qpos
+        poses = evaluator.place(np.arange(len(qpos), dtype=np.int32))
+        copies = [array[: len(qpos)].copy() for array in poses.tables]
+        self._idle.put(evaluator)
+        for copied in copies:
+            # as the engine's own are: for the kernels, arrays that may be written to are another type
+            copied.flags.writeable = False
+        return Poses(*copies)
 
-    def poses(self, qpos: FloatArray, ids: np.ndarray | None = None) -> Poses:
-        """Evaluate positions of the configurations ``(n, nq)``; with *ids*, only those rows are refreshed."""
-        batch = self._for(len(qpos))
-        batch.qpos = qpos
-        fields = Poses(*(batch.bind(f) for f in ("cdof", "subtree_com", "site_xpos", "site_xquat", "xanchor")))
-        batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
-        return fields
+    def in_blocks(self, work: Callable[[Evaluator, slice], None], samples: int) -> None:
+        """Call *work* for each block of samples, over the engine's threads; it writes its own rows of shared arrays."""
 
-    def dynamics(self, qpos: FloatArray, qvel: FloatArray) -> Dynamics:
-        """Evaluate velocity terms, inertia and bias of the states ``(n, nq)``, ``(n, nv)``."""
-        batch = self._for(len(qpos))
-        batch.qpos = qpos
-        batch.qvel = qvel
-        names = ("cdof_dot", "M", "qfrc_bias", "xpos", "xipos", "ximat", "energy", "qfrc_passive")
-        cdof_dot, mass, bias, xpos, xipos, ximat, energy, passive = (batch.bind(f) for f in names)
-        batch.forward(stage=mujoco.mjtStage.mjSTAGE_VEL.value)
-        return Dynamics(
-            cdof_dot.copy(), mass.copy(), bias - passive, xpos.copy(), xipos.copy(), ximat.copy(), energy.copy()
-        )
+        def one(first: int) -> None:
+            evaluator = self._take()
+            try:
+                work(evaluator, slice(first, min(first + BLOCK, samples)))
+            finally:
+                self._idle.put(evaluator)
+
+        starts = range(0, samples, BLOCK)
+        if self.threads == 1 or len(starts) == 1:
+            for first in starts:
+                one(first)
+        else:
+            # a list, so that the error of the first sample at fault is raised, whichever thread meets one first
+            for done in [self._workers().submit(one, first) for first in starts]:
+                done.result()
+
+    def _take(self) -> Evaluator:
+        try:
+            return self._idle.get_nowait()
+        except queue.Empty:
+            return Evaluator(self.model)
+
+    def _workers(self) -> ThreadPoolExecutor:
+        # a forked process has no threads, whatever its parent had
+        if self._pool is None or self._pool[0] != os.getpid():
+            self._pool = os.getpid(), ThreadPoolExecutor(self.threads, thread_name_prefix="workbench")
+        return self._pool[1]
 
 
 def mass_layout(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:

@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from workbench.compiled import compiled
 
 RANK_TOLERANCE = 1e-10
 """A column counts as dependent when its pivot is below this fraction of the largest one."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def factor(a, beta, perm):  # type: ignore[no-untyped-def]
     """Factor ``a (m, p)`` in place; returns the rank. Reflectors below the diagonal, R on and above it.
 
@@ -69,7 +70,7 @@ def factor(a, beta, perm):  # type: ignore[no-untyped-def]
     return rank
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def solve(a, beta, perm, rank, rhs, x):  # type: ignore[no-untyped-def]
     """Least squares ``min |A x - rhs|``; returns the residual norm. ``rhs (m,)`` is overwritten by Q^T rhs."""
     m, p = a.shape
@@ -94,7 +95,7 @@ def solve(a, beta, perm, rank, rhs, x):  # type: ignore[no-untyped-def]
     return math.sqrt(residual)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def solve_transposed(a, beta, perm, rank, rhs, y):  # type: ignore[no-untyped-def]
     """Least-norm ``y (m,)`` with A^T y = rhs ``(p,)``."""
     m = a.shape[0]

@@ -19,9 +19,9 @@ from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf import LoadedModel, custom_text, load_model
 from workbench.reference.closure import Assembly, LoopCloser, constraint_jacobian
-from workbench.reference.engine import Engine, mass_layout, without_bar_inertia
+from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
 from workbench.reference.kernels import projection, velocities
-from workbench.reference.reactions import joint_reactions
+from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.structure import Structure, read_structure
 
 MASS_MODELS = ("distributed", "lumped")
@@ -106,6 +106,9 @@ class MujocoReference:
         self._engines = {"distributed": Engine(loaded.model, threads)}
         self._mass_layout = mass_layout(loaded.model)
         self._closer = LoopCloser(self._engines["distributed"], self._structure)
+        tables = self._closer.tables
+        self._tables = tables.closures, tables.joints, tables.split, tables.bodies
+        self._reaction_rows = reaction_rows(loaded.model, self._structure)
         self._closed: tuple[FloatArray, Assembly] | None = None
         self._base_rotation = np.eye(3)
         self._locate_base()
@@ -186,41 +189,39 @@ class MujocoReference:
         n = len(q)
         if n == 0:
             return self._no_samples(mass_model)
-        force = as_force("external_force", external_force, n) @ self._base_rotation.T
+        # for the kernels, arrays that may not be written to are another type
+        qd, qdd = np.require(qd, requirements="W"), np.require(qdd, requirements="W")
+        force = np.ascontiguousarray(as_force("external_force", external_force, n) @ self._base_rotation.T)
         engine = self._engine(mass_model)
-        nv = engine.model.nv
-        assembly = self._assemble(q)
-        qpos = assembly.qpos
-        poses = engine.poses(qpos)
-        tables = (
-            poses.cdof, poses.com, structure.moves, structure.root, structure.blocks, structure.block_rows,
-            structure.polynomials, poses.site_xpos, poses.site_xquat, poses.anchors, qpos, self._closer.joints,
-            structure.passive, structure.actuated,
-        )  # fmt: skip
-        qvel, velocity_residual = np.zeros((n, nv)), np.zeros(n)
-        rank, condition, weakest = np.zeros(n, dtype=np.int64), np.zeros(n), np.zeros(n, dtype=np.int64)
-        velocities(*tables, qd, qvel, velocity_residual, rank, condition, weakest)
-        self._refuse_singular(q, qd, rank, velocity_residual, weakest)
-        dynamics = engine.dynamics(qpos, qvel)
-        tau, qacc = np.zeros_like(q), np.zeros((n, nv))
-        multipliers, acceleration_residual = np.zeros((n, structure.rows)), np.zeros(n)
+        model, assembly = engine.model, self._assemble(q)
+        qpos, (qvel, qacc) = assembly.qpos, np.zeros((2, n, model.nv))
+        tau, motion, energy = np.zeros_like(q), np.zeros((3, n, 3)), np.zeros((n, 2))
+        velocity_residual, acceleration_residual = np.zeros((2, n))
+        reactions = np.zeros((max(self._reaction_rows.values()) + 1, n, 3))
+        velocities(assembly.tangent, qd, qvel)
         site = structure.platform_site
-        body = int(engine.model.site_bodyid[site])
-        point = np.ascontiguousarray(poses.site_xpos[:, site])
-        projection(
-            tables[0], dynamics.cdof_dot, *tables[1:], qvel, qdd, dynamics.mass, *self._mass_layout, dynamics.bias,
-            body, point, force, qacc, tau, multipliers, acceleration_residual,
-        )  # fmt: skip
+        platform = int(model.site_bodyid[site]), site
+        masses, gravity = np.array(model.body_mass), np.array(model.opt.gravity)
+
+        def block(evaluator: Evaluator, rows: slice) -> None:
+            poses, dynamics = evaluator.move(qpos[rows], qvel[rows])
+            projection(
+                *self._tables, poses.tables, dynamics.tables, self._mass_layout, platform, masses, gravity,
+                self._base_rotation, self._base_position, qpos[rows], qvel[rows], assembly.tangent[rows], qdd[rows],
+                force[rows], qacc[rows], tau[rows], velocity_residual[rows], acceleration_residual[rows],
+                motion[:, rows], reactions[:, rows],
+            )  # fmt: skip
+            energy[rows] = dynamics.energy[: rows.stop - rows.start]
+
+        engine.in_blocks(block, n)
+        self._refuse_singular(q, qd, assembly.rank, velocity_residual, assembly.weakest)
         # in MuJoCo dry friction is a constraint, so neither bias nor passive forces hold it
-        tau += engine.model.dof_frictionloss[structure.actuated] * direction(qd)
-        x, xd, xdd, reactions = joint_reactions(
-            engine.model, structure, poses, dynamics, qvel, qacc, multipliers, force, self._base_rotation,
-            self._base_position,
-        )  # fmt: skip
+        tau += model.dof_frictionloss[structure.actuated] * direction(qd)
         return ReferenceResult(
-            tau=tau, x=x, xd=xd, xdd=xdd, reactions=reactions, closure_residual=assembly.residual,
-            velocity_residual=velocity_residual, acceleration_residual=acceleration_residual, rank=rank,
-            condition=condition, energy=dynamics.energy, qpos=qpos, qvel=qvel, qacc=qacc,
+            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], reactions=named(self._reaction_rows, reactions),
+            closure_residual=assembly.residual.copy(), velocity_residual=velocity_residual,
+            acceleration_residual=acceleration_residual, rank=assembly.rank.copy(),
+            condition=assembly.condition.copy(), energy=energy, qpos=qpos.copy(), qvel=qvel, qacc=qacc,
         )  # fmt: skip
 
     def _no_samples(self, mass_model: str) -> ReferenceResult:

@@ -1,0 +1,137 @@
+"""Constraint rows of one sample, compiled: residuals, Jacobian, second derivatives.
+
+All kinematics come from MuJoCo. Motion vectors follow its com-based convention: (angular, linear) about the centre of
+mass of the kinematic tree.
+"""
+
+from __future__ import annotations
+
+from workbench.compiled import compiled, inlined
+from workbench.reference.structure import CONNECT, JOINT, SPIN, WELD
+
+
+@inlined
+def point_rows(cdof, com, moving, depth, body, point, sign, row, jac):  # type: ignore[no-untyped-def]
+    """Add sign times the translational Jacobian ``(3, nv)`` of a body's point to rows row..row+2."""
+    rx, ry, rz = point[0] - com[0], point[1] - com[1], point[2] - com[2]
+    for k in range(depth[body]):
+        d = moving[body, k]
+        wx, wy, wz = cdof[d, 0], cdof[d, 1], cdof[d, 2]
+        jac[row, d] += sign * (cdof[d, 3] + wy * rz - wz * ry)
+        jac[row + 1, d] += sign * (cdof[d, 4] + wz * rx - wx * rz)
+        jac[row + 2, d] += sign * (cdof[d, 5] + wx * ry - wy * rx)
+
+
+@inlined
+def _turn_rows(cdof, moving, depth, body, sign, row, jac):  # type: ignore[no-untyped-def]
+    """Add sign times the rotational Jacobian ``(3, nv)`` of a body to rows row..row+2."""
+    for k in range(depth[body]):
+        d = moving[body, k]
+        for i in range(3):
+            jac[row + i, d] += sign * cdof[d, i]
+
+
+@inlined
+def _relative_turn(qa, qb, out, row):  # type: ignore[no-untyped-def]
+    """Small rotation vector, world frame, from orientation b to orientation a (unit quaternions w, x, y, z)."""
+    w = qa[0] * qb[0] + qa[1] * qb[1] + qa[2] * qb[2] + qa[3] * qb[3]
+    x = -qa[0] * qb[1] + qa[1] * qb[0] - qa[2] * qb[3] + qa[3] * qb[2]
+    y = -qa[0] * qb[2] + qa[1] * qb[3] + qa[2] * qb[0] - qa[3] * qb[1]
+    z = -qa[0] * qb[3] - qa[1] * qb[2] + qa[2] * qb[1] + qa[3] * qb[0]
+    sign = 2.0 if w >= 0.0 else -2.0
+    out[row], out[row + 1], out[row + 2] = sign * x, sign * y, sign * z
+
+
+@compiled
+def constraint_rows(closures, joints, qpos, cdof, com, site_xpos, site_xquat, anchors, jac, res):  # type: ignore[no-untyped-def]
+    """Fill the constraint Jacobian ``(m, nv)`` and residual ``(m,)`` of one sample."""
+    blocks, block_rows, polynomials, root, moving, depth = closures
+    _kinds, qpos_of, dof_of = joints
+    jac[:, :] = 0.0
+    res[:] = 0.0
+    for k in range(blocks.shape[0]):
+        kind, b1, b2, s1, s2 = blocks[k, 0], blocks[k, 1], blocks[k, 2], blocks[k, 3], blocks[k, 4]
+        row = block_rows[k]
+        if kind in (CONNECT, WELD):
+            point_rows(cdof, com[root[b1]], moving, depth, b1, site_xpos[s1], 1.0, row, jac)
+            point_rows(cdof, com[root[b2]], moving, depth, b2, site_xpos[s2], -1.0, row, jac)
+            for i in range(3):
+                res[row + i] = site_xpos[s1, i] - site_xpos[s2, i]
+            if kind == WELD:
+                _turn_rows(cdof, moving, depth, b1, 1.0, row + 3, jac)
+                _turn_rows(cdof, moving, depth, b2, -1.0, row + 3, jac)
+                _relative_turn(site_xquat[s1], site_xquat[s2], res, row + 3)
+        elif kind == JOINT:
+            c = polynomials[k]
+            y = qpos[qpos_of[s2]] if s2 >= 0 else 0.0
+            jac[row, dof_of[s1]] = 1.0
+            res[row] = qpos[qpos_of[s1]] - (c[0] + y * (c[1] + y * (c[2] + y * (c[3] + y * c[4]))))
+            if s2 >= 0:
+                jac[row, dof_of[s2]] = -(c[1] + y * (2.0 * c[2] + y * (3.0 * c[3] + y * 4.0 * c[4])))
+        elif kind == SPIN:
+            # the rod's axis runs from its ball joint to its far end; scaled by the length, so that rows are metres
+            for j in range(depth[b1]):
+                d = moving[b1, j]
+                s = 0.0
+                for i in range(3):
+                    s += cdof[d, i] * (site_xpos[s1, i] - anchors[s2, i])
+                jac[row, d] = s
+
+
+@inlined
+def body_motion(bodies, cdof, cdof_dot, qvel, qacc, v, a):  # type: ignore[no-untyped-def]
+    """Spatial velocity and acceleration ``(nbody, 6)`` about the centre of mass of each tree, without gravity."""
+    parent, root, first, number = bodies
+    for b in range(parent.shape[0]):
+        carried = b > 0 and root[parent[b]] == root[b]
+        for i in range(6):
+            v[b, i] = v[parent[b], i] if carried else 0.0
+            a[b, i] = a[parent[b], i] if carried else 0.0
+        for d in range(first[b], first[b] + number[b]):
+            for i in range(6):
+                v[b, i] += cdof[d, i] * qvel[d]
+                a[b, i] += cdof_dot[d, i] * qvel[d] + cdof[d, i] * qacc[d]
+
+
+@inlined
+def point_motion(v, a, com, point):  # type: ignore[no-untyped-def]
+    """Velocity and acceleration of the material point of a body, from its spatial vectors about ``com``."""
+    rx, ry, rz = point[0] - com[0], point[1] - com[1], point[2] - com[2]
+    vx = v[3] + v[1] * rz - v[2] * ry
+    vy = v[4] + v[2] * rx - v[0] * rz
+    vz = v[5] + v[0] * ry - v[1] * rx
+    ax = a[3] + a[1] * rz - a[2] * ry + v[1] * vz - v[2] * vy
+    ay = a[4] + a[2] * rx - a[0] * rz + v[2] * vx - v[0] * vz
+    az = a[5] + a[0] * ry - a[1] * rx + v[0] * vy - v[1] * vx
+    return vx, vy, vz, ax, ay, az
+
+
+@compiled
+def acceleration_rows(closures, joints, qpos, com, site_xpos, anchors, qvel, qacc, v, a, out):  # type: ignore[no-untyped-def]
+    """Second time derivative of every constraint, ``(m,)``: J qacc + Jdot qvel, from the bodies' motion."""
+    blocks, block_rows, polynomials, root, _moving, _depth = closures
+    _kinds, qpos_of, dof_of = joints
+    for k in range(blocks.shape[0]):
+        kind, b1, b2, s1, s2 = blocks[k, 0], blocks[k, 1], blocks[k, 2], blocks[k, 3], blocks[k, 4]
+        row = block_rows[k]
+        if kind in (CONNECT, WELD):
+            _, _, _, x1, y1, z1 = point_motion(v[b1], a[b1], com[root[b1]], site_xpos[s1])
+            _, _, _, x2, y2, z2 = point_motion(v[b2], a[b2], com[root[b2]], site_xpos[s2])
+            out[row], out[row + 1], out[row + 2] = x1 - x2, y1 - y2, z1 - z2
+            if kind == WELD:
+                for i in range(3):
+                    out[row + 3 + i] = a[b1, i] - a[b2, i]
+        elif kind == JOINT:
+            c = polynomials[k]
+            out[row] = qacc[dof_of[s1]]
+            if s2 >= 0:
+                y, d = qpos[qpos_of[s2]], dof_of[s2]
+                first = c[1] + y * (2.0 * c[2] + y * (3.0 * c[3] + y * 4.0 * c[4]))
+                second = 2.0 * c[2] + y * (6.0 * c[3] + y * 12.0 * c[4])
+                out[row] -= first * qacc[d] + second * qvel[d] ** 2
+        elif kind == SPIN:
+            # omega . axis = 0 at all times; the axis turns with the body, so its own rate drops out
+            s = 0.0
+            for i in range(3):
+                s += a[b1, i] * (site_xpos[s1, i] - anchors[s2, i])
+            out[row] = s
