@@ -93,7 +93,7 @@ def run_campaign(
         for number, case in enumerate(cases):
             if progress:
                 progress(case.name, number, len(cases))
-            results.append(_compute(campaign, case, file, effort))
+            results.append(compute_named_case(campaign, case, file, effort))
             store.write_series(stage, case.name, results[-1].series)
         if progress:
             progress("", len(cases), len(cases))
@@ -116,7 +116,14 @@ def run_campaign(
     return Outcome(directory, passed, rows, manifest)
 
 
-def _compute(campaign: Campaign, case: Case, file: Path, effort: Effort) -> CaseResult:
+def compute_named_case(campaign: Campaign, case: Case, file: Path, effort: Effort) -> CaseResult:
+    """Compute one case; whatever is wrong names the campaign's file and the case.
+
+    Raises
+    ------
+    WorkbenchError
+        As `compute_case`.
+    """
     try:
         return compute_case(campaign, case, effort)
     except WorkbenchError as found:
