@@ -92,7 +92,7 @@ def test_another_version_is_an_input(workbench: Workbench) -> None:
         (set_error(1e-9, measure="rms_error"), (), "first: lumped against lumped, q2: rms_error"),
         (set_error(1.1 * 10 * FLOOR), (), "(x11)"),
         (set_error(0.9 * 10 * FLOOR), (), None),
-        (set_error(5e-12), ("--factor", "4"), "(x5)"),
+        (set_error(5e-12), ("--factor", "4"), "(x5.00)"),
         (set_error(1e-9), ("--floor", "1e-9"), None),
         (set_error(math.nan), (), "-> nan (lost)"),
         (set_error(math.inf), (), "-> inf (lost)"),
@@ -140,7 +140,7 @@ def test_growth_is_measured_from_the_floor() -> None:
     assert growth(0.5, math.nan) == math.inf
     assert growth(math.nan, math.nan) == growth(math.nan, 1.0) == growth(math.inf, math.inf) == 1.0
     assert [growth_text(f) for f in (1.0, 1.24, 35.4, 3e5, 0.5, 1e-7, math.inf)] == [
-        "x1", "x1.24", "x35", "x3e+05", "/2", "/1e+07", "lost",
+        "x1.00", "x1.24", "x35", "x3e+05", "/2.00", "/1e+07", "lost",
     ]  # fmt: skip
 
 

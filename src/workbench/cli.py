@@ -14,8 +14,10 @@ import typer
 from workbench._version import __version__
 from workbench.commands.compare import compare
 from workbench.commands.model import model
+from workbench.commands.report import report
 from workbench.commands.run import run
 from workbench.commands.status import status
+from workbench.commands.watch import watch
 from workbench.commands.workspace import workspace
 from workbench.errors import WorkbenchError
 
@@ -60,6 +62,7 @@ app.command()(status)
 app.command()(workspace)
 app.add_typer(model)
 app.command()(compare)
+app.command()(watch)
 
 
 def main() -> NoReturn:

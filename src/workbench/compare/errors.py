@@ -95,11 +95,11 @@ def growth(before: float, after: float, floor: float = FLOOR) -> float:
 
 
 def growth_text(factor: float) -> str:
-    """Write a factor in few characters: ``x1.2``, ``x3e+05``, ``/4.1``."""
+    """Write a factor in few characters: ``x1.24``, ``x3e+05``, ``/4.1``."""
     if not math.isfinite(factor) or factor == 0.0:
         return "lost" if factor else "gone"
     sign, size = ("x", factor) if factor >= 1 else ("/", 1 / factor)
-    return f"{sign}{size:.0e}" if size >= 1000 else f"{sign}{size:.3g}" if size < 10 else f"{sign}{size:.0f}"
+    return f"{sign}{size:.0e}" if size >= 1000 else f"{sign}{size:.2f}" if size < 10 else f"{sign}{size:.0f}"
 
 
 def match_errors(before: Iterable[Measured], after: Iterable[Measured]) -> list[ErrorChange]:

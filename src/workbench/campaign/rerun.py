@@ -1,0 +1,95 @@
+"""The errors of a campaign, computed again and again while its files are edited: nothing is written."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from workbench.campaign.cases import locate, resolve_cases
+from workbench.campaign.compare import Row
+from workbench.campaign.evidence import Effort
+from workbench.campaign.run import compute_named_case
+from workbench.campaign.spec import CsvMotion, load_campaign
+from workbench.errors import WorkbenchError
+from workbench.mjcf import find_model
+
+QUICK = Effort(budget=False, drawing=False)
+"""Errors only."""
+
+Stamp = tuple[int, int, int] | None
+"""Modification time, size and inode of a file; None where there is none."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """What one pass over a campaign gives."""
+
+    rows: tuple[Row, ...]
+    joints: tuple[str, ...]
+    parameters: Mapping[str, Mapping[str, float]]
+    """case -> parameter -> value"""
+    messages: tuple[str, ...]
+    """what else is wrong with a case, one line each"""
+    seconds: float
+
+
+def compute_errors(
+    path: str | Path,
+    *,
+    model: Path | None = None,
+    only: Sequence[str] = (),
+    settings: Mapping[str, float] | None = None,
+    relative: Sequence[str] = (),
+) -> Errors:
+    """Compute every error of a campaign as it now stands; arguments as for `workbench.campaign.run.run_campaign`.
+
+    Raises
+    ------
+    WorkbenchError
+        Bad input, in one line.
+    """
+    clock = time.perf_counter()
+    campaign, file = load_campaign(path)
+    cases = resolve_cases(campaign, file, model, tuple(only), settings, relative)
+    results = [compute_named_case(campaign, case, file, QUICK) for case in cases]
+    return Errors(
+        rows=tuple(row for result in results for row in result.rows),
+        joints=cases[0].mechanism.joints,
+        parameters={case.name: dataclasses.asdict(case.mechanism.parameters) for case in cases},
+        messages=tuple(f'case "{r.name}": {r.facts["message"]}' for r in results if r.facts["message"]),
+        seconds=time.perf_counter() - clock,
+    )
+
+
+def files_of(path: str | Path, model: Path | None = None) -> tuple[Path, ...]:
+    """Files that a campaign's numbers come from: itself, its model, its motions; as far as they can be told."""
+    found = [Path(path)]
+    if model is not None:
+        with contextlib.suppress(WorkbenchError):
+            found.append(find_model(model))
+    with contextlib.suppress(WorkbenchError):
+        campaign, file = load_campaign(path)
+        found[0] = file
+        names = [] if model is not None else [(campaign.model, "model")]
+        names += [(case.motion.file, "motion.file") for case in campaign.case if isinstance(case.motion, CsvMotion)]
+        for name, what in names:
+            with contextlib.suppress(WorkbenchError):
+                found.append(locate(file, name, what))
+    return tuple(dict.fromkeys(found))
+
+
+def stamps(files: Sequence[Path]) -> dict[Path, Stamp]:
+    """Say of each file what changes when it is saved."""
+    return {file: _stamp(file) for file in files}
+
+
+def _stamp(file: Path) -> Stamp:
+    try:
+        status = file.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size, status.st_ino

@@ -1,0 +1,190 @@
+"""Saving a file while a campaign is watched: the table comes again, an error is shown, and the watch goes on."""
+
+from __future__ import annotations
+
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from small_campaign import SMALL, Workbench, listing
+from workbench.campaign.rerun import compute_errors, files_of, stamps
+from workbench.errors import SpecError
+
+MODELS = Path(__file__).resolve().parents[1] / "models"
+ASYM = "models/asym_2rss_ppap.xml"
+PATIENCE = 60.0
+"""Seconds for one pass on a busy machine."""
+
+
+class Watch:
+    """A watch in a process of its own."""
+
+    def __init__(self, directory: Path, *options: str) -> None:
+        self.directory = directory
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "workbench.cli", "watch", *options],
+            cwd=directory, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        )  # fmt: skip
+        self._lines: queue.Queue[str] = queue.Queue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> Watch:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+        self._reader.join()
+        assert self.process.stdout
+        self.process.stdout.close()
+
+    def _read(self) -> None:
+        assert self.process.stdout
+        for line in self.process.stdout:
+            self._lines.put(line)
+
+    def shown(self) -> str:
+        """What one pass shows."""
+        lines = []
+        while not lines or not lines[-1].startswith("watching "):
+            lines.append(self._lines.get(timeout=PATIENCE))
+        return "".join(lines)
+
+    def rest(self) -> str:
+        self.process.wait(PATIENCE)
+        self._reader.join()
+        return "".join(self._lines.get() for _ in range(self._lines.qsize()))
+
+
+def save(path: Path, text: str, by_renaming: bool = False) -> float:
+    """Save as editors do: over the old file, or beside it and then moved."""
+    place = path.with_name(f".{path.name}.swp") if by_renaming else path
+    place.write_text(text, encoding="utf-8")
+    if by_renaming:
+        os.replace(place, path)
+    return time.monotonic()
+
+
+@pytest.fixture
+def watched(tmp_path: Path) -> Iterator[Watch]:
+    (tmp_path / "models").mkdir()
+    (tmp_path / ASYM).write_text((MODELS / Path(ASYM).name).read_text())
+    (tmp_path / "small.toml").write_text(SMALL)
+    with Watch(tmp_path, "small.toml") as watch:
+        yield watch
+
+
+def test_a_session(watched: Watch) -> None:
+    model, campaign = watched.directory / ASYM, watched.directory / "small.toml"
+    text = model.read_text()
+    before = listing(watched.directory)
+    first = watched.shown()
+    assert "12 within their bounds" in first
+    assert "asym_2rss_ppap.xml" in first.splitlines()[-1]
+    assert " = " not in first  # nothing to compare with
+
+    save(model, text.replace('mass="0.45"', 'mass="0.9"'))
+    shown = watched.shown()
+    assert "m3: 0.45 -> 0.9\n" in shown
+    assert "12 within their bounds" in shown
+    assert " ~ " in shown
+    assert "x1." in shown or "/1." in shown or "/2." in shown
+
+    save(model, text.replace('mass="0.45"', 'mass="0.9"').replace("0 0 0.15", "0.001 0 0.15", 1), by_renaming=True)
+    shown = watched.shown()
+    assert len(shown.splitlines()) == 2
+    assert 'inertial "rod_left" pos is 0.001; the closed form needs 0' in shown
+
+    save(campaign, SMALL + "\nfoo =")
+    assert "small.toml: not valid TOML" in watched.shown()
+    save(campaign, SMALL.replace("bound = 1e-10", "bound = 1e-25"))
+    save(model, text)
+    while "beyond their bounds" not in (shown := watched.shown()):
+        pass
+    assert "pass -> fail" in shown
+
+    save(campaign, SMALL, by_renaming=True)
+    assert "12 within their bounds" in watched.shown()
+    watched.process.send_signal(signal.SIGINT)
+    assert watched.rest() == "stopped\n"
+    assert watched.process.returncode == 0
+    assert listing(watched.directory) == before
+
+
+def test_only_one_case_and_another_model(tmp_path: Path) -> None:
+    (tmp_path / "small.toml").write_text(SMALL)
+    (tmp_path / "own.xml").write_text((MODELS / Path(ASYM).name).read_text())
+    options = "small.toml", "--only", "first", "--model", "own.xml", "--set", "a2*=1.01"
+    with Watch(tmp_path, *options) as watch:
+        shown = watch.shown()
+        assert "6 within their bounds" in shown
+        assert "own.xml" in shown.splitlines()[-1]
+        save(tmp_path / "own.xml", (tmp_path / "own.xml").read_text().replace('pos="0 0 0.3"', 'pos="0 0 0.31"'))
+        assert "a2_left: 0.303 -> 0.3131" in watch.shown()
+
+
+@pytest.fixture
+def workbench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Workbench:
+    return Workbench(tmp_path, monkeypatch, capsys)
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (("nowhere.toml",), "nowhere.toml: no such campaign file"),
+        (("small.toml", "--set", "a2"), '--set "a2": expected NAME=VALUE'),
+        (("small.toml", "--factor", "0"), "factor 0; allowed"),
+        ((), "Missing argument 'CAMPAIGN'"),
+    ],
+)
+def test_bad_input_is_one_line(workbench: Workbench, options: tuple[str, ...], expected: str) -> None:
+    workbench.write(SMALL)
+    done = workbench("watch", *options)
+    assert done.code == 2
+    assert expected in done.err
+    assert len(done.complaint) == 1
+
+
+def test_files_of_a_campaign(workbench: Workbench) -> None:
+    workbench.write(SMALL)
+    assert [file.name for file in files_of("small.toml")] == ["small.toml", "asym_2rss_ppap.xml"]
+    own = workbench.directory / "own.xml"
+    own.write_text("<mujoco/>")
+    assert files_of("small.toml", own) == (Path("small.toml"), own)
+    workbench.write("nonsense")
+    assert files_of("small.toml") == (Path("small.toml"),)
+    before = stamps(files_of("small.toml"))
+    workbench.write("more nonsense")
+    assert stamps(files_of("small.toml")) != before
+    assert stamps([Path("gone")]) == {Path("gone"): None}
+    with pytest.raises(SpecError, match="not valid TOML"):
+        compute_errors("small.toml")
+
+
+@pytest.mark.slow
+def test_from_save_to_table_in_less_than_two_seconds(tmp_path: Path) -> None:
+    """The 2010 paper's campaign; the best of three, since the machine may be busy with something else."""
+    campaign = MODELS.parent / "campaigns/almeida_2010.toml"
+    (tmp_path / "models").mkdir()
+    (tmp_path / "campaigns").mkdir()
+    (tmp_path / "campaigns/almeida_2010.toml").write_text(campaign.read_text())
+    model = tmp_path / ASYM
+    text = (MODELS / Path(ASYM).name).read_text()
+    model.write_text(text)
+    with Watch(tmp_path, "campaigns/almeida_2010.toml") as watch:
+        watch.shown()
+        taken = []
+        for mass in ("0.5", "0.6", "0.7"):
+            saved = save(model, text.replace('mass="0.45"', f'mass="{mass}"'))
+            assert f"-> {mass}\n" in watch.shown()
+            taken.append(time.monotonic() - saved)
+        assert min(taken) < 2.0, taken
