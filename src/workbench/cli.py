@@ -14,7 +14,6 @@ import typer
 from workbench._version import __version__
 from workbench.commands.compare import compare
 from workbench.commands.model import model
-from workbench.commands.report import report
 from workbench.commands.run import run
 from workbench.commands.status import status
 from workbench.commands.watch import watch
