@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -129,9 +130,16 @@ def resolve_case(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, f
     ModelError, ParameterError, MotionError
         As `resolve_cases`, without the case's name.
     """
+    # out of reach is found without compiling; the loaded model gives the same parameters, bit for bit, or is refused
+    planned = _unchanged(model).with_parameters(**overrides)
+    case = _resolve(spec, file, model, overrides, planned)
     loaded = load_model(model, overrides)
-    case = _resolve(spec, file, model, overrides, _mechanism_of(loaded, model))
-    return dataclasses.replace(case, loaded=loaded)
+    return dataclasses.replace(case, loaded=loaded, mechanism=_mechanism_of(loaded, model))
+
+
+@lru_cache(maxsize=1)
+def _unchanged(model: Path) -> Mechanism:
+    return _mechanism(model, {})
 
 
 def layered(*layers: Mapping[str, float]) -> dict[str, float]:

@@ -49,7 +49,7 @@ def plain_line(found: Snapshot) -> str:
     troubles = [f"{n} {status}" for status, n in found.counts.items() if n and status != "passed"]
     rate = [f"{found.rate:.1f} cases/s"] if found.rate else []
     left = [f"{duration(found.remaining_s)} left"] if found.remaining_s else []
-    return ", ".join([f"[{found.done}/{found.total}]", *rate, *left, *troubles]).replace("],", "]", 1)
+    return f"[{found.done}/{found.total}] " + (", ".join([*rate, *left, *troubles]) or "cases")
 
 
 class SweepProgress:

@@ -28,6 +28,9 @@ from workbench.errors import MotionError, WorkbenchError
 MEASURED = ("peak_error", "rms_error", "pointwise_error", "peak_reference")
 """Columns that have to be finite numbers."""
 
+NO_MEMORY = "Could not allocate memory"
+"""How MuJoCo says it, in errors of several kinds."""
+
 Task = tuple[int, tuple[float, ...]]
 """A case's number and its varied numbers."""
 
@@ -101,9 +104,11 @@ def evaluate(context: Context, task: Task) -> Answer:
         result = compute_case(context.campaign, case, context.effort)
     except MemoryError:
         raise
-    except WorkbenchError as error:
-        return Answer(lost(index, key, FAILED, str(error)))
     except Exception as error:
+        if NO_MEMORY in str(error):
+            raise MemoryError from error
+        if isinstance(error, WorkbenchError):
+            return Answer(lost(index, key, FAILED, str(error)))
         return Answer(lost(index, key, FAILED, f"{type(error).__name__}: {error}"))
     status, reason = _judge(result)
     keep = context.keep_series == "all" or (context.keep_series == "failed" and status != PASSED)
