@@ -19,3 +19,19 @@ settings.load_profile("workbench")
 def repository() -> Path:
     """The root of the source checkout."""
     return Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def warm_kernels(repository: Path) -> None:
+    """Both robots' kernels compiled and kept: a first use says so on stderr, where some tests look at every line."""
+    import numpy as np
+
+    import workbench as wb
+
+    for robot, x in {"asym_2rss_ppap": (0.0, 0.0, 0.4), "planar_4rprp": (0.26, 0.25, 0.3)}.items():
+        reference = wb.MujocoReference(repository / "models" / f"{robot}.xml")
+        mechanism = wb.load_mechanism(repository / "models" / f"{robot}.xml")
+        q, still = mechanism.inverse_kinematics(np.tile(x, (30, 1))), np.zeros((30, 3))
+        mechanism.platform_motion(q, still, still)
+        mechanism.inverse_dynamics(q, still, still)
+        reference.inverse_dynamics(q, still, still)

@@ -72,8 +72,8 @@ class Done:
 
     @property
     def complaint(self) -> list[str]:
-        """Lines on stderr that are no progress, ``[1/2] first``."""
-        return [line for line in self.err.splitlines() if not re.match(r"\[\d+/\d+\] ", line)]
+        """Lines on stderr that are no progress, ``[1/2] first``, and no notice of a first use."""
+        return [line for line in self.err.splitlines() if not re.match(r"\[\d+/\d+\] |workbench: compiling ", line)]
 
 
 def listing(directory: Path) -> dict[str, bytes | None]:

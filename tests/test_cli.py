@@ -15,6 +15,8 @@ import workbench as wb
 from small_campaign import SMALL, Workbench, listing
 from workbench import cli
 
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
 
 @pytest.fixture
 def workbench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Workbench:

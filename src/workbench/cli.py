@@ -19,6 +19,7 @@ from workbench.commands.status import status
 from workbench.commands.watch import watch
 from workbench.commands.workspace import workspace
 from workbench.errors import WorkbenchError
+from workbench.notices import subscribers
 
 app = typer.Typer(
     name="workbench",
@@ -66,7 +67,13 @@ app.command()(watch)
 
 def main() -> NoReturn:
     """Run the command line; whatever goes wrong becomes one line and an exit code."""
+    if _notice not in subscribers:
+        subscribers.append(_notice)
     sys.exit(_run(sys.argv[1:] or ["--help"]))
+
+
+def _notice(text: str) -> None:
+    typer.echo(f"workbench: {text}", err=True)
 
 
 def _run(arguments: list[str]) -> int:

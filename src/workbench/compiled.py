@@ -1,27 +1,28 @@
 """How kernels are compiled: one decorator, so that every kernel has the same arithmetic, cache and first-use message.
 
 Machine code is kept beside the module or, where that directory is read-only, in the user's cache directory. The first
-use after installation therefore takes a while, once; the logger ``workbench`` says so at level INFO, and libraries that
-embed the workbench decide themselves whether that is shown.
+use after installation therefore takes a while, once; a notice (`workbench.notices`) says so.
 """
 
 from __future__ import annotations
 
 import hashlib
-import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from numba import njit
 
-LOGGER = logging.getLogger("workbench")
+from workbench.notices import tell
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 """IEEE arithmetic throughout, no fast-math: NaN stays NaN, and a sample's result does not depend on whether it was
 computed alone, in a vector register with others, or in another thread. A division by zero is infinite, as in NumPy."""
 
-KERNEL_FILES = ("mechanisms/*_kernel.py", "mechanisms/blocks.py", "mechanisms/sine_cosine.py", "reference/*.py")
+KERNEL_FILES = (
+    *(f"mechanisms/{name}.py" for name in ("asym_2rss_ppap_kernel", "planar_4rprp_kernel", "blocks", "sine_cosine")),
+    *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "structure", "tables")),
+)
 """What machine code is made of. A kernel calls into other files, and its cache must not outlive a change in those."""
 
 
@@ -45,8 +46,7 @@ def _cached(function: Callable[..., Any], more: dict[str, Any]) -> Any:
         cache_file = dispatcher._cache._cache_file
         cache_file._source_stamp = (cache_file._source_stamp, _fingerprint())
     except AttributeError:
-        # another numba keeps it elsewhere; its own rule, the kernel's file alone, remains
-        LOGGER.debug("kernels' cache knows only the file of each kernel itself")
+        return dispatcher  # another numba keeps it elsewhere; its own rule, the kernel's file alone, remains
     return dispatcher
 
 
@@ -56,29 +56,9 @@ _known: list[str] = []
 def _fingerprint() -> str:
     if not _known:
         root = Path(__file__).parent
-        sources = sorted(path for pattern in KERNEL_FILES for path in root.glob(pattern))
-        _known.append(hashlib.sha256(b"".join(path.read_bytes() for path in (Path(__file__), *sources))).hexdigest())
+        sources = b"".join((root / name).read_bytes() for name in ("compiled.py", *KERNEL_FILES))
+        _known.append(hashlib.sha256(sources).hexdigest())
     return _known[0]
-
-
-class _FirstUse:
-    """Listens to numba's compiler and speaks once."""
-
-    def __init__(self) -> None:
-        self.said = False
-
-    def on_start(self, event: Any) -> None:
-        dispatcher = event.data.get("dispatcher")
-        kernel = getattr(dispatcher, "py_func", None)
-        if self.said or not getattr(kernel, "__module__", "").startswith("workbench."):
-            return
-        self.said = True
-        place = getattr(getattr(dispatcher, "_cache", None), "cache_path", None)
-        kept = f"kept in {place}" if place else "not kept: no writable cache directory; set NUMBA_CACHE_DIR"
-        LOGGER.info("compiling numerical kernels for this machine, once, some seconds (%s)", kept)
-
-    def on_end(self, event: Any) -> None:
-        """Nothing to say."""
 
 
 def _announce() -> None:
@@ -87,17 +67,25 @@ def _announce() -> None:
     except ImportError:
         return
 
-    class Listener(event.Listener):  # type: ignore[misc]
-        def __init__(self) -> None:
-            self._first_use = _FirstUse()
+    class FirstUse(event.Listener):  # type: ignore[misc]
+        """Listens to numba's compiler and speaks once; what comes from the cache is not compiled."""
+
+        said = False
 
         def on_start(self, event: Any) -> None:
-            self._first_use.on_start(event)
+            dispatcher = event.data.get("dispatcher")
+            kernel = getattr(dispatcher, "py_func", None)
+            if self.said or not getattr(kernel, "__module__", "").startswith("workbench."):
+                return
+            self.said = True
+            place = getattr(getattr(dispatcher, "_cache", None), "cache_path", None)
+            kept = f"kept in {place}" if place else "not kept: no writable cache directory; set NUMBA_CACHE_DIR"
+            tell(f"compiling numerical kernels for this machine, once; takes some seconds ({kept})")
 
         def on_end(self, event: Any) -> None:
-            self._first_use.on_end(event)
+            pass
 
-    event.register("numba:compile", Listener())
+    event.register("numba:compile", FirstUse())
 
 
 _announce()

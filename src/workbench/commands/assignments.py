@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from workbench.errors import ParameterError
-from workbench.mechanisms.assignments import parse_assignment
 
 SETTING = "NAME=VALUE with a number in SI units"
 RELATIVE = ("*=", "/=", "+=", "-=")
@@ -24,6 +23,9 @@ def settings(assignments: Iterable[str]) -> tuple[dict[str, float], list[str]]:
     ParameterError
         No ``=``, a value that is not a number, or a name given twice.
     """
+    # here, because it brings NumPy along, which `workbench --help` need not wait for
+    from workbench.mechanisms.assignments import parse_assignment
+
     found: dict[str, float] = {}
     relative: list[str] = []
     names: set[str] = set()

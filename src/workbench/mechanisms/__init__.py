@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from importlib import import_module
+from typing import TYPE_CHECKING
 
-from workbench.mechanisms.base import Mechanism
+if TYPE_CHECKING:
+    from workbench.mechanisms.base import Mechanism
 
 MECHANISMS: dict[str, str] = {
     "asym_2rss_ppap": "workbench.mechanisms.asym_2rss_ppap:Asym2rssPpap",

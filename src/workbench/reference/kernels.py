@@ -86,7 +86,8 @@ def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, t
     closed, floor, astray = limits
     m, nv, p, na = closures[1][-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
-    a, beta, perm, x = np.empty((m, p)), np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
+    # columns side by side in memory: the factor works along them
+    a, beta, perm, x = np.empty((p, m)).T, np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
     step = np.zeros(nv)
     active = np.empty_like(ids)
     more = 0
@@ -158,7 +159,8 @@ def projection(  # type: ignore[no-untyped-def]
     m, nv, p, na = block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     nbody = masses.shape[0]
     jac, res, rates = np.empty((m, nv)), np.empty(m), np.empty(m)
-    a, beta, perm, x = np.empty((m, p)), np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
+    # columns side by side in memory: the factor works along them
+    a, beta, perm, x = np.empty((p, m)).T, np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
     force, passive_force, multipliers = np.empty(nv), np.empty(p), np.empty(m)
     v, acc, carried = np.empty((nbody, 6)), np.empty((nbody, 6)), np.empty((nbody, 3))
     for s in range(qpos.shape[0]):

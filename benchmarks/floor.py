@@ -1,0 +1,63 @@
+"""Compile `floor.c` on the spot and call it: how fast the same equations are in C, scalar and in vectors."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+SOURCE = Path(__file__).with_name("floor.c")
+SCALAR = ("-O3", "-march=native")
+VECTOR = ("-O3", "-march=native", "-ffast-math", "-fopenmp-simd")
+LIBRARIES = (("-lmvec", "-lm"), ("-lm",))
+"""glibc's vector math library where there is one"""
+
+PREFIX = {"asym_2rss_ppap": "asym", "planar_4rprp": "planar"}
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The two libraries, and how they were compiled."""
+
+    scalar: ctypes.CDLL
+    vector: ctypes.CDLL
+    commands: tuple[str, str]
+
+    def call(self, robot: str, vector: bool, *arrays: np.ndarray) -> Callable[[], None]:
+        """Bind constants, q, qd, qdd, force, tau: what remains is the call through ctypes."""
+        library, suffix = (self.vector, "blocks") if vector else (self.scalar, "rows")
+        function = getattr(library, f"{PREFIX[robot]}_{suffix}")
+        function.restype = None
+        pointers = [ctypes.c_void_p(array.ctypes.data) for array in arrays]
+        count = ctypes.c_int64(arrays[-1].size // 3)
+
+        def bound() -> None:
+            function(*pointers, count)
+
+        bound.keeps = arrays  # type: ignore[attr-defined]
+        return bound
+
+
+def build(directory: Path) -> Floor | None:
+    """Compile both forms into *directory*; None where there is no C compiler."""
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        return None
+    scalar = _compile(compiler, SCALAR, directory / "floor_scalar.so")
+    vector = _compile(compiler, VECTOR, directory / "floor_vector.so")
+    if scalar is None or vector is None:
+        return None
+    return Floor(ctypes.CDLL(scalar[0]), ctypes.CDLL(vector[0]), (scalar[1], vector[1]))
+
+
+def _compile(compiler: str, options: tuple[str, ...], target: Path) -> tuple[str, str] | None:
+    for libraries in LIBRARIES:
+        command = [compiler, *options, "-shared", "-fPIC", "-o", str(target), str(SOURCE), *libraries]
+        if subprocess.run(command, check=False, capture_output=True).returncode == 0:
+            return str(target), " ".join([Path(compiler).name, *options, *libraries])
+    return None
