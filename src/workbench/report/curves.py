@@ -22,8 +22,11 @@ MARKED_SAMPLES = 28
 """Markers in one panel, shared by its references."""
 LONGEST_NAME = 32
 """Longer names are cut in legends; the tables hold them whole."""
-ERROR_POINTS = 150
-"""An error curve with more samples is drawn as the largest value of as many bins: no peak is lost."""
+ERROR_POINTS = (60, 120)
+"""An error curve with more samples is drawn as the largest value of as many bins: no peak is lost; fewer bins where
+many curves share a panel."""
+CURVE_BINS = 900
+"""Bins of all error curves of a panel together, within those limits."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +125,9 @@ def error_of_row(row: ErrorRow, series: Series, color: str) -> ErrorCurve | None
 def error_panel(axes: Axes, curves: Sequence[ErrorCurve], bounds: Iterable[float]) -> None:
     """Draw errors on a logarithmic axis with the worst moment of each and the bounds as lines."""
     low, high = math.inf, -math.inf
+    bins = int(np.clip(CURVE_BINS // max(1, len(curves)), *ERROR_POINTS))
     for curve in curves:
-        time, error = _envelope(curve.time, np.maximum(curve.error, SMALLEST_DRAWN))
+        time, error = _envelope(curve.time, np.maximum(curve.error, SMALLEST_DRAWN), bins)
         style = (0, (3, 1)) if curve.is_modelling else "-"
         axes.plot(time, error, color=curve.color, linewidth=0.8, linestyle=style, label=curve.label)
         low = min(low, float(np.nanquantile(error, 0.03)))
@@ -153,8 +157,8 @@ def error_panel(axes: Axes, curves: Sequence[ErrorCurve], bounds: Iterable[float
     axes.set_ylabel("relative error")
 
 
-def _envelope(time: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-    if len(time) <= ERROR_POINTS:
+def _envelope(time: FloatArray, error: FloatArray, bins: int) -> tuple[FloatArray, FloatArray]:
+    if len(time) <= bins:
         return time, error
-    starts = np.linspace(0, len(time), ERROR_POINTS, endpoint=False).astype(int)
+    starts = np.linspace(0, len(time), bins, endpoint=False).astype(int)
     return time[starts], np.maximum.reduceat(error, starts)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import cast
 
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase, SubFigure
 from matplotlib.ticker import FixedLocator, FuncFormatter
+from matplotlib.transforms import Transform, blended_transform_factory
 
 from workbench.report.style import INK
 from workbench.report.svg import OVER_TIME, OWN
@@ -52,8 +54,23 @@ def stack(figure: FigureBase, heights: Sequence[float], header: int = 0, over: s
     for axes in panels[:-1]:
         axes.tick_params(labelbottom=False)
     panels[-1].set_xlabel(over)
-    figure.align_ylabels(panels)
+    # Fixed places: to find them from the tick labels takes a third of the drawing time.
+    for axes in panels:
+        axes.yaxis.set_label_coords(0.19 / width, 0.5, transform=_beside(figure, axes))
+    panels[-1].xaxis.set_label_coords(0.5, 0.19 / height, transform=_below(figure, panels[-1]))
     return panels
+
+
+def _whole(figure: FigureBase) -> Transform:
+    return cast(Transform, figure.transSubfigure)  # type: ignore[attr-defined]
+
+
+def _beside(figure: FigureBase, axes: Axes) -> Transform:
+    return blended_transform_factory(_whole(figure), axes.transAxes)
+
+
+def _below(figure: FigureBase, axes: Axes) -> Transform:
+    return blended_transform_factory(axes.transAxes, _whole(figure))
 
 
 def size_of(figure: FigureBase) -> tuple[float, float]:

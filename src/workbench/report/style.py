@@ -28,7 +28,7 @@ STYLE: Any = {
     "svg.fonttype": "none",  # text stays text: small, searchable, the same bytes on every machine
     "svg.hashsalt": "workbench",
     "path.simplify": True,
-    "path.simplify_threshold": 0.25,
+    "path.simplify_threshold": 0.4,
     "font.family": "sans-serif",
     "font.size": 8.5,
     "axes.titlesize": 9.0,
@@ -63,8 +63,7 @@ STYLE: Any = {
 }
 
 PAPER: Any = STYLE | {
-    "font.family": "serif",
-    "mathtext.fontset": "dejavuserif",
+    "font.family": ["serif", "sans-serif"],  # the second has the ticks and crosses
     "axes.grid": False,
     "axes.spines.top": True,
     "axes.spines.right": True,

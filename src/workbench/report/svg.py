@@ -29,6 +29,9 @@ OVER_TIME = f"{OWN}over-time"
 _DECLARATIONS = re.compile(
     r"^.*?(?=<svg)|<metadata>.*?</metadata>\s*|<defs>\s*<style.*?</style>\s*</defs>\s*", re.DOTALL
 )
+_PATH = re.compile(r' d="([^"]*)"')
+_STEP = re.compile(r"([A-Zz])\s*(?:(-?[\d.]+(?:e-?\d+)?)[\s]+(-?[\d.]+(?:e-?\d+)?)((?:\s+-?[\d.]+)+)?)?")
+_STYLE = re.compile(r' style="([^"]*)"')
 _GEOMETRY = re.compile(r'(?<= )(?:d|x|y|transform)="[^"<>]*"')
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _FONT = re.compile(r"font-family: [^;\"]*")
@@ -103,23 +106,66 @@ def _is_curve(line: Line2D) -> bool:
 
 
 def compact(svg: str, key: str) -> str:
-    """Strip what matplotlib adds around the drawing, round coordinates and make identifiers unique to *key*."""
+    """Strip what matplotlib adds around the drawing, shorten coordinates and make identifiers unique to *key*."""
     svg = _DECLARATIONS.sub("", svg)
+    svg = _PATH.sub(lambda match: f' d="{_relative(match[1])}"', svg)
     svg = _GEOMETRY.sub(
         lambda match: _LONG_NUMBER.sub(lambda number: f"{float(number[0]):.2f}", match[0].replace("\n", "")), svg
     )
     svg = _FONT.sub("font-family: sans-serif", svg)
-    used = {match[2] for match in _REFERENCE.finditer(svg)}
+    short: dict[str, str] = {}
+    for match in _REFERENCE.finditer(svg):
+        short.setdefault(match[2], f"{key}-{len(short)}")
 
     def identifier(match: re.Match[str]) -> str:
         if match[3].startswith(OWN):
             return f'{match[1]}{match[2]} class="{match[3]}"'
-        kept = f' id="{key}-{match[3]}"' if match[3] in used else ""
+        kept = f' id="{short[match[3]]}"' if match[3] in short else ""
         return f"{match[1]}{match[2]}{kept}"
 
     svg = _IDENTIFIER.sub(identifier, svg)
-    svg = _REFERENCE.sub(lambda match: f"{match[1]}{key}-{match[2]}", svg)
+    svg = _REFERENCE.sub(lambda match: f"{match[1]}{short[match[2]]}", svg)
     return re.sub(r"\n\s*", "\n", svg)
+
+
+def _relative(path: str) -> str:
+    """Write a path in hundredths of a point, with lines as steps from point to point: two thirds of the bytes."""
+    pieces: list[str] = []
+    x = y = 0
+    for kind, first, second, other in _STEP.findall(path):
+        if other or kind not in "ML":
+            return path  # curves, of markers: short anyway
+        to_x, to_y = round(100 * float(first)), round(100 * float(second))
+        pieces.append(
+            f"M{_hundredths(to_x)} {_hundredths(to_y)}"
+            if kind == "M"
+            else f"l{_hundredths(to_x - x)} {_hundredths(to_y - y)}"
+        )
+        x, y = to_x, to_y
+    return "".join(pieces) + ("z" if path.rstrip().endswith("z") else "")
+
+
+def _hundredths(value: int) -> str:
+    return f"{value / 100:.2f}".rstrip("0").rstrip(".").replace("-0.", "-.").removeprefix("0") or "0"
+
+
+class StyleSheet:
+    """Gathers the styles of all drawings of a page, so that each is written once."""
+
+    def __init__(self) -> None:
+        self._names: dict[str, str] = {}
+
+    def shorten(self, svg: str) -> str:
+        """Replace every ``style`` attribute by a class."""
+        return _STYLE.sub(lambda match: f' class="{self._name(match[1])}"', svg)
+
+    def _name(self, style: str) -> str:
+        return self._names.setdefault(style, f"p{len(self._names)}")
+
+    @property
+    def rules(self) -> str:
+        """The classes as CSS."""
+        return "".join(f".drawing .{name}{{{style}}}\n" for style, name in self._names.items())
 
 
 def standalone(svg: str, alt: str) -> str:

@@ -78,8 +78,11 @@
   /* ---- plots over time ---- */
   const parsePath = (d) => {
     const found = [];
-    for (const match of d.matchAll(/([MLz])\s*(?:(-?[\d.]+(?:e-?\d+)?)\s+(-?[\d.]+(?:e-?\d+)?))?/g)) {
-      if (match[2] !== undefined) found.push([match[1], Number(match[2]), Number(match[3])]);
+    let [x, y] = [0, 0];
+    for (const match of d.matchAll(/([Ml])\s*(-?[\d.]+)\s+(-?[\d.]+)/g)) {
+      const [first, second] = [Number(match[2]), Number(match[3])];
+      [x, y] = match[1] === "M" ? [first, second] : [x + first, y + second];
+      found.push([match[1] === "M" ? "M" : "L", x, y]);
     }
     return found;
   };
@@ -99,12 +102,10 @@
         const path = svg.querySelector(`.wb-curve-${number}-${index} path`);
         return path ? { label, path, points: parsePath(path.getAttribute("d")) } : null;
       }).filter(Boolean);
-      const own = new Set(this.curves.map((curve) => curve.path));
       this.uses = [...this.group.querySelectorAll("use")]
         .filter((use) => !use.closest('[class^="wb-times"]') && Number(use.getAttribute("x")) > this.left + 0.01)
-        .map((use) => ({ use, x: Number(use.getAttribute("x")), shown: use.style.display }));
+        .map((use) => ({ use, x: Number(use.getAttribute("x"))}));
       this.moments = [...this.group.querySelectorAll(".wb-moment")];
-      this.own = own;
       this.cursor = draw("line", { class: "cursor", y1: this.top, y2: this.bottom, visibility: "hidden" }, svg);
       this.dots = this.curves.map(() => draw("circle", { class: "dot", r: 2.6, visibility: "hidden" }, svg));
     }
@@ -147,7 +148,7 @@
         if (within) {
           dot.setAttribute("cx", x.toFixed(2));
           dot.setAttribute("cy", found.y.toFixed(2));
-          dot.style.fill = curve.path.style.stroke;
+          dot.style.fill = getComputedStyle(curve.path).stroke;
           told.push(`${curve.label} ${short(found.value)}`);
         }
       });
@@ -159,10 +160,10 @@
       const [start, stop] = window;
       const isWhole = start <= this.start && stop >= this.stop;
       const scale = (this.stop - this.start) / (stop - start);
-      const shift = this.left - scale * (this.whole(start) - this.left) - scale * 0;
+      const shift = this.left - scale * (this.whole(start) - this.left);
       const moved = (x) => (isWhole ? x : shift + scale * (x - this.left));
       for (const { path, points } of this.curves) {
-        path.setAttribute("d", points.map(([kind, x, y]) => `${kind} ${moved(x).toFixed(2)} ${y}`).join(" "));
+        path.setAttribute("d", points.map(([kind, x, y]) => `${kind} ${moved(x).toFixed(2)} ${y.toFixed(2)}`).join(" "));
       }
       for (const { use, x } of this.uses) {
         const place = moved(x);

@@ -1,0 +1,29 @@
+"""``workbench report``: rebuild a report from a run's stored results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def report(
+    run_dir: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="Directory that a run has written.")],
+    format_: Annotated[
+        list[str] | None,
+        typer.Option("--format", metavar="html|md|pdf", help="May be repeated. Default: html and md."),
+    ] = None,
+    style: Annotated[
+        str, typer.Option(metavar="page|paper", help="How figures look: on a page, or in the column of a paper.")
+    ] = "page",
+) -> None:
+    """Rebuild the report from what a run has stored; nothing is computed again.
+
+    html: report.html. md: report.md with figures/*.svg. pdf: report.pdf, figures/*.pdf and tables/*.tex.
+    """
+    from workbench.report import build_report
+
+    for path in build_report(run_dir, tuple(dict.fromkeys(format_ or ("html", "md"))), style):
+        if path.parent == run_dir:
+            typer.echo(str(path))
