@@ -14,6 +14,7 @@ import typer
 from workbench._version import __version__
 from workbench.commands.compare import compare
 from workbench.commands.model import model
+from workbench.commands.report import report
 from workbench.commands.run import run
 from workbench.commands.status import status
 from workbench.commands.watch import watch
@@ -57,6 +58,7 @@ def _root(
     """Validate closed-form dynamics of parallel robots against MuJoCo."""
 
 
+app.command()(report)
 app.command()(run)
 app.command()(status)
 app.command()(workspace)
