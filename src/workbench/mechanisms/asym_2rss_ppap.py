@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from workbench.arrays import FloatArray, as_batch, as_batches
-from workbench.errors import MotionError, ParameterError
+from workbench.errors import ParameterError
 from workbench.mechanisms import asym_2rss_ppap_kernel as kernel
 from workbench.mechanisms.asym_2rss_ppap_candidates import CANDIDATES
 from workbench.mechanisms.asym_2rss_ppap_friction import Friction
 from workbench.mechanisms.asym_2rss_ppap_kernel import SINGULAR
 from workbench.mechanisms.asym_2rss_ppap_parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
-from workbench.mechanisms.base import Mechanism, Reach
+from workbench.mechanisms.base import Mechanism, Reach, refuse_samples
 from workbench.mechanisms.kernel_call import TorqueKernel, fill_torques, one_sample
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.mass_models import mass_model as mass_model_of
@@ -106,7 +106,7 @@ class Asym2rssPpap(Mechanism):
                 raise ParameterError(f'unknown elbow branch "{elbow}"; valid: {", ".join(ELBOWS)}')
         q, problems = self._arm_angles(points, elbows)
         for bad, joint, what in problems:
-            self._refuse(bad, joint, what, points, "x")
+            refuse_samples(bad, joint, what, points, "x")
         return q
 
     def reach(self, x: ArrayLike) -> Reach:
@@ -199,7 +199,7 @@ class Asym2rssPpap(Mechanism):
             rod = points + np.array([0.0, side * platform, 0.0]) - tip
             lever = np.sum(rod * tangent, axis=1)
             short = np.abs(lever) < SINGULAR * a1 * np.linalg.norm(rod, axis=1)
-            self._refuse(short, joint, "singular pose: arm and rod in line (J_q)", points, "x")
+            refuse_samples(short, joint, "singular pose: arm and rod in line (J_q)", points, "x")
             rate = np.sum(rod * velocities, axis=1) / lever
             relative = velocities - tangent * rate[:, None]
             needed = np.sum(rod * (accelerations - inward * rate[:, None] ** 2), axis=1)
@@ -246,7 +246,7 @@ class Asym2rssPpap(Mechanism):
         """Name the sample and the joint of a batch whose torques are not all finite."""
         self._motion(q, qd, qdd)
         bad = ~np.isfinite(tau).all(axis=1)
-        self._refuse(bad, "q1, q2, q3", "rates so large that torques overflow", q, "q")
+        refuse_samples(bad, "q1, q2, q3", "rates so large that torques overflow", q, "q")
 
     def _constants_of(self, mass_model: str) -> FloatArray:
         if mass_model not in self._constants:
@@ -280,14 +280,14 @@ class Asym2rssPpap(Mechanism):
         p = self._parameters
         rod = min(p.a2_left, p.a2_right)
         turned = np.abs(q[:, 1:]).max(axis=1, initial=0.0)
-        self._refuse(turned > LARGEST_ANGLE, "q2, q3", f"an angle exceeds {LARGEST_ANGLE:g} rad", q, "q")
-        self._refuse(np.abs(q[:, 0]) > rod, "q1", f"|q1| exceeds the rod length {rod:g} m", q, "q")
-        self._refuse(np.isnan(x).any(axis=1), "q2, q3", "the rods cannot meet at the platform", q, "q")
-        self._refuse(np.abs(x[:, 1]) >= p.a5, "q2, q3", f"|x2| reaches the parallelogram's length {p.a5:g} m", q, "q")
+        refuse_samples(turned > LARGEST_ANGLE, "q2, q3", f"an angle exceeds {LARGEST_ANGLE:g} rad", q, "q")
+        refuse_samples(np.abs(q[:, 0]) > rod, "q1", f"|q1| exceeds the rod length {rod:g} m", q, "q")
+        refuse_samples(np.isnan(x).any(axis=1), "q2, q3", "the rods cannot meet at the platform", q, "q")
+        refuse_samples(np.abs(x[:, 1]) >= p.a5, "q2, q3", f"|x2| reaches the parallelogram's length {p.a5:g} m", q, "q")
         joints = {"det J_x": "q2, q3", "J_q22": "q2", "J_q33": "q3"}
         for measure, value in self._scaled(determinants).items():
             what = f"singular pose: |{measure}| below {SINGULAR:g} of its scale"
-            self._refuse(np.abs(value) < SINGULAR, joints[measure], what, q, "q")
+            refuse_samples(np.abs(value) < SINGULAR, joints[measure], what, q, "q")
         return x, xd, xdd, jacobian, determinants
 
     def _scaled(self, determinants: FloatArray) -> dict[str, FloatArray]:
@@ -297,19 +297,6 @@ class Asym2rssPpap(Mechanism):
             "J_q22": determinants[:, 1] / (p.a1_left * p.a2_left),
             "J_q33": determinants[:, 2] / (p.a1_right * p.a2_right),
         }
-
-    @staticmethod
-    def _refuse(bad: ArrayLike, joint: str, what: str, values: FloatArray, name: str) -> None:
-        if np.any(bad):
-            sample = int(np.argmax(bad))
-            shown = ", ".join(f"{value:.6g}" for value in values[sample])
-            raise MotionError(
-                f"sample {sample}, joint {joint}: {what} at {name} = ({shown})",
-                sample=sample,
-                joint=joint,
-                reason=what,
-                value=values[sample].tolist(),
-            )
 
 
 Asym2rssPpap.candidates = CANDIDATES

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from workbench.arrays import FloatArray, as_force, as_rows, same_lengths
-from workbench.errors import ParameterError, did_you_mean
+from workbench.errors import MotionError, ParameterError, did_you_mean
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.parameters import (
     ParameterInfo,
@@ -301,3 +301,24 @@ class Mechanism(ABC):
     def _check_mass_model(self, mass_model: str) -> None:
         if mass_model not in self.mass_models:
             raise ParameterError(f'unknown mass model "{mass_model}"{did_you_mean(mass_model, self.mass_models)}')
+
+
+def refuse_samples(bad: ArrayLike, joint: str, what: str, values: FloatArray, name: str) -> None:
+    """Raise for the first sample marked in *bad* ``(n,)``; *values* ``(n, k)``, called *name*, are shown for it.
+
+    Raises
+    ------
+    MotionError
+        Naming sample, joint, what is wrong and the values; the facts carry the same.
+    """
+    marked = np.asarray(bad, dtype=bool)
+    if marked.any():
+        sample = int(np.argmax(marked))
+        shown = ", ".join(f"{value:.6g}" for value in values[sample])
+        raise MotionError(
+            f"sample {sample}, joint {joint}: {what} at {name} = ({shown})",
+            sample=sample,
+            joint=joint,
+            reason=what,
+            value=values[sample].tolist(),
+        )

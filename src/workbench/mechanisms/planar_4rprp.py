@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch, as_batches
-from workbench.errors import MotionError
 from workbench.mechanisms import planar_4rprp_kernel as kernel
 from workbench.mechanisms import planar_4rprp_screws as screw_route
-from workbench.mechanisms.base import Candidate, Condition, Mechanism, Reach
+from workbench.mechanisms.base import Candidate, Condition, Mechanism, Reach, refuse_samples
 from workbench.mechanisms.kernel_call import TorqueKernel, fill_torques, one_sample
 from workbench.mechanisms.layout import Layout
 from workbench.mechanisms.parameters import ParameterInfo, Target, UniformRule
@@ -108,12 +107,12 @@ class Planar4Rprp(Mechanism):
             A position that is not on the home branch (Px > 0, Py > 0), or where limb 4 has no length.
         """
         points = as_batch("x", x)
-        self._refuse(points[:, 0] <= 0, "q2", "position is not on the home branch Px > 0", points, "x")
-        self._refuse(points[:, 1] <= 0, "q1, q3", "position is not on the home branch Py > 0", points, "x")
+        refuse_samples(points[:, 0] <= 0, "q2", "position is not on the home branch Px > 0", points, "x")
+        refuse_samples(points[:, 1] <= 0, "q1, q3", "position is not on the home branch Py > 0", points, "x")
         p = self._parameters
         px, py, pz = points.T
         short = np.hypot(p.a - px, py - p.h) < SINGULAR * p.a
-        self._refuse(short, "q4", "singular pose: the passive limb 4 has no length", points, "x")
+        refuse_samples(short, "q4", "singular pose: the passive limb 4 has no length", points, "x")
         return np.stack([np.hypot(py, pz), np.hypot(px, py - p.h), np.hypot(py, p.b - pz)], axis=1)
 
     def reach(self, x: ArrayLike) -> Reach:
@@ -272,7 +271,7 @@ class Planar4Rprp(Mechanism):
         """Name the sample and the joint of a batch whose torques are not all finite."""
         self.platform_motion(q, qd, qdd)
         bad = ~np.isfinite(tau).all(axis=1)
-        self._refuse(bad, "q1, q2, q3", "rates so large that forces overflow", q, "q")
+        refuse_samples(bad, "q1, q2, q3", "rates so large that forces overflow", q, "q")
 
     @property
     def has_friction(self) -> bool:
@@ -320,32 +319,19 @@ class Planar4Rprp(Mechanism):
 
     def _refuse_lengths(self, q: FloatArray) -> None:
         for column, joint in enumerate(self.joints):
-            self._refuse(q[:, column] <= 0, joint, "limb length must be > 0", q, "q")
+            refuse_samples(q[:, column] <= 0, joint, "limb length must be > 0", q, "q")
 
     def _refuse_unreachable(self, q: FloatArray, x: FloatArray) -> None:
         self._refuse_lengths(q)
-        self._refuse(np.isnan(x[:, 1]), "q1, q3", "limbs 1 and 3 cannot meet", q, "q")
-        self._refuse(np.isnan(x[:, 0]), "q2", "limb 2 is shorter than |Py - h|", q, "q")
+        refuse_samples(np.isnan(x[:, 1]), "q1, q3", "limbs 1 and 3 cannot meet", q, "q")
+        refuse_samples(np.isnan(x[:, 0]), "q2", "limb 2 is shorter than |Py - h|", q, "q")
 
     def _refuse_poses(self, q: FloatArray, x: FloatArray) -> None:
         self._refuse_unreachable(q, x)
         measures = self._measures(q, x)
         for (measure, value), joint in zip(measures.items(), ("q1, q2, q3", "q4"), strict=True):
             what = f"singular pose: {measure} below {SINGULAR:g}"
-            self._refuse(np.abs(value) < SINGULAR, joint, what, q, "q")
-
-    @staticmethod
-    def _refuse(bad: np.ndarray[Any, np.dtype[np.bool_]], joint: str, what: str, values: FloatArray, name: str) -> None:
-        if bad.any():
-            sample = int(np.argmax(bad))
-            shown = ", ".join(f"{value:.6g}" for value in values[sample])
-            raise MotionError(
-                f"sample {sample}, joint {joint}: {what} at {name} = ({shown})",
-                sample=sample,
-                joint=joint,
-                reason=what,
-                value=values[sample].tolist(),
-            )
+            refuse_samples(np.abs(value) < SINGULAR, joint, what, q, "q")
 
 
 def _squared(vectors: FloatArray, first: int, second: int) -> FloatArray:

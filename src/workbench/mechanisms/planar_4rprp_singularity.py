@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch
-from workbench.mechanisms.planar_4rprp import SINGULAR, Planar4Rprp
+from workbench.mechanisms.planar_4rprp import Planar4Rprp
+from workbench.mechanisms.planar_4rprp_kernel import SINGULAR
 
 
 @dataclass(frozen=True)
