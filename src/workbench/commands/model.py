@@ -19,6 +19,9 @@ CampaignFile = Annotated[
 CaseName = Annotated[
     str | None, typer.Option("--case", metavar="NAME", help="Case of the campaign. Default: its first one.")
 ]
+Start = Annotated[float | None, typer.Option("--start", metavar="T", help="Second of the motion to begin with.")]
+Stop = Annotated[float | None, typer.Option("--stop", metavar="T", help="Second of the motion to end with.")]
+Speed = Annotated[float, typer.Option("--speed", metavar="X", help="1: the motion's own time; 0.1: ten times slower.")]
 
 
 @model.command()
@@ -69,3 +72,55 @@ def check(path: ModelFile, json: Json = False) -> None:
         print_check(found)
     if found.exit_code:
         raise typer.Exit(found.exit_code)
+
+
+@model.command()
+def view(
+    path: ModelFile,
+    campaign: CampaignFile = None,
+    case: CaseName = None,
+    start: Start = None,
+    stop: Stop = None,
+    speed: Speed = 1.0,
+) -> None:
+    """Show the robot in MuJoCo's interactive viewer, in its home pose or replaying a case, until the window closes."""
+    from workbench.commands.pictures import poses_of, positive
+    from workbench.rendering.system import refuse_without_display
+    from workbench.rendering.viewer import REFRESH_S
+    from workbench.rendering.viewer import view as open_viewer
+
+    positive("speed", speed)
+    refuse_without_display()
+    open_viewer(poses_of(path, campaign, case, start, stop, REFRESH_S * speed), speed)
+
+
+@model.command()
+def render(
+    path: ModelFile,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Picture (.png) or film (.gif, .mp4).")],
+    campaign: CampaignFile = None,
+    case: CaseName = None,
+    start: Start = None,
+    stop: Stop = None,
+    speed: Speed = 1.0,
+    fps: Annotated[float, typer.Option(metavar="RATE", help="Pictures of a film a second.")] = 25.0,
+    size: Annotated[str, typer.Option(metavar="WxH", help="Pixels.")] = "640x480",
+    camera: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Camera of the model. Default: as the viewer begins.")
+    ] = None,
+) -> None:
+    """Draw the robot without a screen: a picture of a pose, or a film of a case."""
+    from workbench.commands.pictures import poses_of, positive, size_of
+    from workbench.console import out as console
+    from workbench.rendering.files import check_target, write_pictures
+    from workbench.rendering.offscreen import draw
+
+    positive("speed", speed)
+    positive("fps", fps)
+    width, height = size_of(size)
+    check_target(out, campaign is not None)
+    film = out.suffix.lower() != ".png"
+    poses = poses_of(path, campaign, case, start, stop if film else start, speed / fps)
+    write_pictures(out, draw(poses, width, height, camera), (width, height), fps)
+    pictures = f"{len(poses.qpos)} pictures" if film else "1 picture"
+    console.print(f"{out}: {pictures} of {poses.title}", soft_wrap=True, markup=False)
