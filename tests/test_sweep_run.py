@@ -439,7 +439,7 @@ def start(name: str, out: str, *options: str) -> subprocess.Popen[bytes]:
 @pytest.mark.slow
 def test_the_runner_killed_at_twenty_random_moments(workbench: Workbench) -> None:
     chance = random.Random(5)
-    name = workbench.write(SWEEP.replace("samples = 40", "samples = 600"))
+    name = workbench.write(SWEEP.replace("samples = 40", "samples = 400"))
     assert workbench("run", name, "--out", "calm", "--jobs", "2").code == 0
     kills = 0
     for _ in range(200):
@@ -482,7 +482,7 @@ def test_ctrl_c_on_real_workers(workbench: Workbench) -> None:
 @pytest.mark.slow
 def test_a_cluster_whose_worker_is_killed_gives_the_same_bytes(workbench: Workbench) -> None:
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
-    text = SWEEP.replace("samples = 40", "samples = 300")
+    text = SWEEP.replace("samples = 40", "samples = 200")
     name = workbench.write(text)
     assert workbench("run", name, "--out", "calm", "--jobs", "2").code == 0
     path = os.pathsep.join(p for p in sys.path if p)

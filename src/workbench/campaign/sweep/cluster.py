@@ -76,7 +76,7 @@ class ClusterPool:
         from distributed import as_completed
 
         waiting: dict[str, list[tuple[int, Any]]] = {}
-        futures = as_completed()
+        futures = as_completed(loop=self._client.loop)
         source = iter(tasks)
 
         def submit() -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import io
@@ -24,9 +25,12 @@ from workbench.campaign.sweep.plan import Recipe
 from workbench.campaign.sweep.record import FAILED, FILTERED, INVALID, PASSED, Record, lost
 from workbench.campaign.verdict import FAILURES
 from workbench.errors import MotionError, WorkbenchError
+from workbench.reference import MujocoReference
 
 MEASURED = ("peak_error", "rms_error", "pointwise_error", "peak_reference")
 """Columns that have to be finite numbers."""
+
+COLUMNS = tuple(f.name for f in dataclasses.fields(Row) if f.name != "case")
 
 NO_MEMORY = "Could not allocate memory"
 """How MuJoCo says it, in errors of several kinds."""
@@ -73,7 +77,19 @@ class Context:
         here = common_key(self.campaign, self.file, self.model, self.settings, self.effort, self.keep_series)
         if here != self.common:
             raise WorkbenchError("model, code or versions of this worker are not those of the run")
+        with contextlib.suppress(WorkbenchError):
+            self._warm_up()
         return partial(evaluate, self)
+
+    def _warm_up(self) -> None:
+        """Compile what is compiled on first use, so that no case's time and memory are charged for it."""
+        overrides = layered(self.campaign.parameters, self.campaign.case[0].parameters, self.settings)
+        case = resolve_case(self.campaign.case[0], self.file, self.model, overrides)
+        reference = MujocoReference(case.model, threads=1, loaded=case.loaded, **overrides)
+        q, qd, qdd = (values[:2] for values in (case.motion.q, case.motion.qd, case.motion.qdd))
+        for mass_model in dict.fromkeys(c.reference for c in self.campaign.candidate):
+            reference.inverse_dynamics(q, qd, qdd, mass_model)
+            case.mechanism.inverse_dynamics(q, qd, qdd, mass_model)
 
 
 def evaluate(context: Context, task: Task) -> Answer:
@@ -113,7 +129,7 @@ def evaluate(context: Context, task: Task) -> Answer:
     status, reason = _judge(result)
     keep = context.keep_series == "all" or (context.keep_series == "failed" and status != PASSED)
     series = series_bytes(result) if keep else None
-    rows = [{k: v for k, v in dataclasses.asdict(row).items() if k != "case"} for row in result.rows]
+    rows = [{name: getattr(row, name) for name in COLUMNS} for row in result.rows]
     hashed = hashlib.sha256(series).hexdigest() if series is not None else ""
     return Answer(Record(index, key, status, reason, rows, _figures(result.facts), hashed), series)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import zlib
 from dataclasses import dataclass, field
@@ -42,7 +41,7 @@ class Record:
 
     def line(self) -> bytes:
         """Return the record as one line with a checksum; floats read back bit-equal."""
-        text = json.dumps(dataclasses.asdict(self), separators=(",", ":")).encode()
+        text = json.dumps(vars(self), separators=(",", ":")).encode()
         return b"%08x %s\n" % (zlib.crc32(text), text)
 
 
