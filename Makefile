@@ -11,12 +11,14 @@ CAMPAIGN ?= campaigns/almeida_2010.toml
 # SLOW=1 adds the tests marked slow.
 SLOW ?=
 PYTEST_ARGS ?=
+# Campaigns whose reports are kept in reports/published.
+PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models
 
 # What an interpreter must offer: uv brings its own installer, pip comes from the interpreter's ensurepip.
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow lint format clean
+.PHONY: help setup run test test-slow test-browser reports lint format clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -55,6 +57,18 @@ test: lint ## Check style and types, then run the tests (SLOW=1: all of them)
 
 test-slow: $(STAMP) ## Run only the tests marked slow
 	$(BIN)/pytest -m slow $(PYTEST_ARGS)
+
+test-browser: $(STAMP) ## Run the tests that open a report in Chromium
+	$(BIN)/pytest -n 2 -m browser $(PYTEST_ARGS)
+
+reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings in their heads differ
+	@for name in $(PUBLISHED); do \
+	  $(BIN)/workbench run campaigns/$$name.toml --out build/reports/$$name || exit 1; \
+	  rm -rf reports/published/$$name; \
+	  mkdir -p reports/published/$$name; \
+	  cp -R build/reports/$$name/report.html build/reports/$$name/report.md build/reports/$$name/figures \
+	    reports/published/$$name || exit 1; \
+	done
 
 lint: $(STAMP) ## Check style and types
 	$(BIN)/ruff check .

@@ -34,7 +34,9 @@ def all_outcomes(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
     rows[0] |= {"verdict": "fail", "peak_error": 0.5}
     rows[1] |= {"verdict": "undecided", "uncertainty": 5e-11}
     rows[2] |= {"verdict": "expected-fail", "kind": "expected-failure", "peak_error": 1.0}
-    manifest["cases"]["slow"] = {"status": "error", "message": "case slow: stopped after 60 s (limit 60 s): timed out"}
+    manifest["cases"]["slow"] = {"status": "timeout", "message": "takes longer than allowed: 60 s"}
+    manifest["cases"]["odd"] = {"status": "invalid", "message": "case odd: a1 is -0.2 m; allowed: above 0"}
+    manifest["cases"]["sim2"]["status"] = "undecided"
 
 
 @pytest.fixture(scope="module", params=["plain", "hostile"])
@@ -214,8 +216,12 @@ def test_outcomes_differ_at_a_glance(chromium: Any, page_file: Path) -> None:
             return [badge.className.split("status-")[1], look]; }))""")
         assert len(set(looks.values())) == len(looks)
         assert {"passed", "error", "measured", "undecided", "refuted"} <= set(looks)
-        if "sim1" in page.locator("#case-sim1 .status-failed").all_inner_texts():
-            assert {"failed", "expected"} <= set(looks)
+        if page.locator("#case-slow").count():
+            assert {"failed", "expected", "timeout", "invalid"} <= set(looks)
+            edges = page.evaluate("""() => [...document.querySelectorAll("article.case")].map((article) => {
+                const style = getComputedStyle(article);
+                return [style.borderLeftStyle, style.borderLeftColor].join(" "); })""")
+            assert len(set(edges)) == 5  # failed, error, timed out, invalid, undecided
 
 
 def test_names_are_text(chromium: Any, page_file: Path) -> None:

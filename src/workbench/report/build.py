@@ -23,6 +23,7 @@ from workbench.report.sections import build_sections
 from workbench.report.style import STYLES, figure_style
 from workbench.report.svg import StyleSheet, inline, standalone
 from workbench.report.text import fenced, finalize_markdown
+from workbench.report.verdict_section import circumstances
 
 FIGURES = "figures"
 TABLES = "tables"
@@ -124,6 +125,7 @@ def render_html(run: Run, sections: list[Section]) -> str:
     page = environment.get_template("report.html.j2")
     text = page.render(
         manifest=run.manifest,
+        circumstances=circumstances(run),
         sections=bodies,
         style=Markup(style + sheet.rules),
         script=Markup(script),
@@ -155,7 +157,9 @@ def render_markdown(run: Run, sections: list[Section]) -> str:
         (section, Markup(environment.get_template(f"{section.template}.md.j2").render(section.context)))
         for section in sections
     ]
-    text = environment.get_template("report.md.j2").render(manifest=run.manifest, sections=bodies)
+    text = environment.get_template("report.md.j2").render(
+        manifest=run.manifest, circumstances=circumstances(run), sections=bodies
+    )
     return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"
 
 

@@ -176,7 +176,7 @@ class DrawingRecord(Record):
 class CaseRecord(Record):
     """One case: its status and the scalar evidence about mechanism and reference. Missing evidence is None."""
 
-    status: Literal["passed", "failed", "error"]
+    status: Literal["passed", "failed", "error", "undecided", "invalid", "timeout", "killed", "filtered"]
     title: str = ""
     description: str = ""
     message: str | None = None

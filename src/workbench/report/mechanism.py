@@ -19,7 +19,7 @@ from workbench.report.svg import OWN, POINTS_PER_INCH
 
 SIZE = (9.0, 3.6)
 FRAME_COUNTS = (24, 48, 96, 192, 384)
-SMOOTH = 0.006
+SMOOTH = 0.008
 """Share of the drawing by which a point may leave the straight line between two frames."""
 SCALE = 10
 """Frames hold tenths of a point."""

@@ -18,6 +18,7 @@ from workbench.report.section import Section
 from workbench.report.style import GRID, INK
 from workbench.report.svg import new_figure
 from workbench.report.tables import Cell, Table
+from workbench.report.verdict_section import circumstances
 
 A4 = (8.27, 11.69)
 MARGIN = 0.55
@@ -168,7 +169,8 @@ def report_pdf(run: Run, sections: Sequence[Section]) -> bytes:
             pages = Pages(sink)
             pages.lines(f"Error report of the campaign {manifest.campaign}", SMALL_PRINT, after=0.02)
             pages.lines(title, 15.0, bold=True)
-            pages.lines(manifest.description, BODY, after=0.2)
+            pages.lines(manifest.description, BODY, after=0.1)
+            pages.lines(" ".join(circumstances(run)), SMALL_PRINT, after=0.2)
             for section in sections:
                 _set_section(pages, section)
             pages.finish()

@@ -16,7 +16,7 @@ from workbench.report.load import Run, Series
 from workbench.report.manifest import FigureRecord
 from workbench.report.plot import Plot
 from workbench.report.section import Section
-from workbench.report.tables import CASE_STATUS, CHECKED, Cell, Table, columns
+from workbench.report.tables import CASE_STATUS, CHECKED, NOT_COMPUTED, Cell, Table, columns
 from workbench.report.text import error_fraction, exact, pretty_unit, scientific, slug
 from workbench.report.verdict_section import verdict_section
 
@@ -46,14 +46,14 @@ def build_sections(run: Run) -> list[Section]:
     drawn: dict[int, Plot | str] = {}
     views = []
     for name, record in run.manifest.cases.items():
-        series: Series | None = None if record.status == "error" else run.series(name)
+        series: Series | None = None if record.status in NOT_COMPUTED else run.series(name)
         views.append(case_view(run, name, anchors[name], series))
         for index, figure in enumerate(figures):
             if figure.case == name and figure.kind != "error_over":
                 drawn[index] = (
                     campaign_plot(run, figure, keys[index], series, anchors[name])
                     if series is not None
-                    else f"Not drawn: case {name} ended in an error."
+                    else f"Not drawn: case {name} was not computed."
                 )
     for index, figure in enumerate(figures):
         if figure.kind == "error_over":
@@ -172,12 +172,7 @@ def reproduce_section(run: Run) -> Section:
         ("Model", manifest.model.file),
         ("Model SHA-256", manifest.model.sha256),
         ("Mechanism", manifest.model.mechanism),
-        ("Git commit", manifest.git_commit or "not a git checkout"),
         *([("Engines", ", ".join(manifest.engines))] if manifest.engines else []),
-        ("Started", manifest.started),
-        ("Finished", manifest.finished),
-        ("Run time", "–" if manifest.seconds is None else f"{manifest.seconds:.1f} s"),
-        ("Machine", ", ".join(f"{key}: {value}" for key, value in manifest.machine.items())),
         *((f"Version of {name}", version) for name, version in manifest.versions.items()),
     ]
     table = Table(
@@ -186,7 +181,7 @@ def reproduce_section(run: Run) -> Section:
         columns(("Item", "Value")),
         tuple((Cell(what), Cell(value)) for what, value in rows),
         "Same command, model and versions: same numbers, bit for bit; another version of a library may move the "
-        "last digits.",
+        "last digits. When and where this run was made stands at the top.",
     )
     spec = json.dumps(manifest.spec, indent=1, ensure_ascii=False, default=str) if manifest.spec else ""
     return Section(
@@ -199,7 +194,7 @@ def limits_section(run: Run) -> Section:
     records = [record for record in run.manifest.cases.values() if record.closure_residual is not None]
     closure = max((record.closure_residual or 0.0 for record in records), default=math.nan)
     warned = sum(len(record.warnings) for record in run.manifest.cases.values())
-    broken = sum(record.status == "error" for record in run.manifest.cases.values())
+    broken = sum(record.status in NOT_COMPUTED for record in run.manifest.cases.values())
     points = [
         "This verifies formulas against a simulator. It does not validate either against a real robot: friction, "
         "clearance, "

@@ -34,6 +34,7 @@ _STEP = re.compile(r"([A-Zz])\s*(?:(-?[\d.]+(?:e-?\d+)?)[\s]+(-?[\d.]+(?:e-?\d+)
 _STYLE = re.compile(r' style="([^"]*)"')
 _GEOMETRY = re.compile(r'(?<= )(?:d|x|y|transform)="[^"<>]*"')
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
+_UPRIGHT = re.compile(r' transform="rotate\(-?0 [^"]*"')
 _FONT = re.compile(r"font-family: [^;\"]*")
 _IDENTIFIER = re.compile(r'(?<=<)(\w+)([^<>]*?) id="([^"<>]*)"')
 _REFERENCE = re.compile(r'(url\(#|href="#)([^")]+)')
@@ -113,6 +114,7 @@ def compact(svg: str, key: str) -> str:
         lambda match: _LONG_NUMBER.sub(lambda number: f"{float(number[0]):.2f}", match[0].replace("\n", "")), svg
     )
     svg = _FONT.sub("font-family: sans-serif", svg)
+    svg = _UPRIGHT.sub("", svg)
     short: dict[str, str] = {}
     for match in _REFERENCE.finditer(svg):
         short.setdefault(match[2], f"{key}-{len(short)}")
@@ -157,6 +159,7 @@ class StyleSheet:
 
     def shorten(self, svg: str) -> str:
         """Replace every ``style`` attribute by a class."""
+        svg = svg.replace("xlink:href", "href")
         return _STYLE.sub(lambda match: f' class="{self._name(match[1])}"', svg)
 
     def _name(self, style: str) -> str:

@@ -30,7 +30,18 @@ PASSED_VERDICT = Status("passed", "✓", "PASSED", loud=True)
 ERROR_VERDICT = Status("error", "⚠", "ERROR", loud=True)
 UNDECIDED_VERDICT = Status("undecided", "?", "UNDECIDED", loud=True)
 
-CASE_STATUS = {"passed": PASSED, "failed": FAILED, "error": ERROR}
+CASE_STATUS = {
+    "passed": PASSED,
+    "failed": FAILED,
+    "error": ERROR,
+    "undecided": UNDECIDED_VERDICT,
+    "invalid": Status("invalid", "⊘", "invalid, not computed"),
+    "timeout": Status("timeout", "⏱", "TIMED OUT", loud=True),
+    "killed": Status("timeout", "☠", "KILLED", loud=True),
+    "filtered": Status("measured", "", "filtered out"),
+}
+NOT_COMPUTED = frozenset({"error", "invalid", "timeout", "killed", "filtered"})
+"""Statuses of cases that have no series."""
 VERDICT_STATUS = {
     "pass": PASSED,
     "fail": FAILED,

@@ -9,6 +9,7 @@ from workbench.report.tables import (
     ERROR_VERDICT,
     FAILED,
     FAILURES,
+    NOT_COMPUTED,
     PASSED_VERDICT,
     UNDECIDED_VERDICT,
     Cell,
@@ -25,27 +26,36 @@ def verdict_section(run: Run) -> Section:
     sentence = sentence[:1].upper() + sentence[1:]
     contrasts = {row.candidate for row in run.rows if row.kind == "contrast"}
     tested = sum(name not in contrasts for name in run.manifest.candidates)
-    timed = any(candidate.cost_us is not None for candidate in run.manifest.candidates.values())
-    names = ("Candidate", "Mass model", "What it is", "Source", *(("Cost [µs per sample]",) if timed else ()))
     table = Table(
         "candidates",
         "The candidates: the formulas that this campaign puts to the test.",
-        columns(names, numeric=names[4:]),
+        columns(("Candidate", "Mass model", "What it is", "Source")),
         tuple(
-            (
-                Cell(name),
-                Cell(candidate.mass_model),
-                Cell(candidate.description),
-                Cell(candidate.source),
-                *((Cell(exact(candidate.cost_us, 3), candidate.cost_us),) if timed else ()),
-            )
+            (Cell(name), Cell(candidate.mass_model), Cell(candidate.description), Cell(candidate.source))
             for name, candidate in run.manifest.candidates.items()
         ),
-        "The mass model is the assumption about the bars' masses that a formula shares with its reference."
-        + (" The cost is timed in the run and is the one figure that differs from run to run." if timed else ""),
+        "The mass model is the assumption about the bars' masses that a formula shares with its reference.",
     )
     context = {"status": status, "sentence": sentence, "manifest": run.manifest, "tables": [table], "tested": tested}
     return Section("verdict", "Verdict", "verdict", context)
+
+
+def circumstances(run: Run) -> tuple[str, ...]:
+    """Say when and where the run was made and what its formulas cost there: all that differs from run to run."""
+    manifest = run.manifest
+    machine = ", ".join(f"{key} {value}" for key, value in manifest.machine.items())
+    seconds = "" if manifest.seconds is None else f", in {manifest.seconds:.1f} s"
+    costs = [
+        f"{name} {exact(candidate.cost_us, 2)} µs"
+        for name, candidate in manifest.candidates.items()
+        if candidate.cost_us is not None
+    ]
+    told = [
+        f"Run {manifest.started or 'at an unknown time'}{seconds}" + (f", on {machine}" if machine else ""),
+        f"Git commit {manifest.git_commit}" if manifest.git_commit else "",
+        f"Cost per sample there: {', '.join(costs)}" if costs else "",
+    ]
+    return tuple(f"{text}." for text in told if text)
 
 
 def verdict(run: Run) -> tuple[Status, str]:
@@ -56,7 +66,7 @@ def verdict(run: Run) -> tuple[Status, str]:
     undecided = [row for row in run.rows if row.verdict == "undecided"]
     declared = [row for row in run.rows if row.verdict in ("expected-fail", "unexpected-pass")]
     unseen = [row for row in declared if row.verdict == "unexpected-pass"]
-    broken = [name for name, record in cases.items() if record.status == "error"]
+    broken = [name for name, record in cases.items() if record.status in NOT_COMPUTED]
     # A case can fail with every row within its bound: its kinematics disagree, and its message says so.
     accused = {row.case for row in run.rows if row.verdict in FAILURES}
     other = [name for name, record in cases.items() if record.status == "failed" and name not in accused]
