@@ -10,9 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from workbench.arrays import FloatArray
+from workbench.compiled import compiled
 from workbench.mechanisms.friction import DriveFriction
 
 JOINTS = ("q1", "q2", "q3")
@@ -59,7 +59,7 @@ class Friction:
         return tau
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def add_passive(limbs, central, q, qd, x, xd, jacobian, tau):  # type: ignore[no-untyped-def]
     """Add to tau ``(n, 3)`` what friction in the passive joints costs."""
     for i in range(q.shape[0]):

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from workbench.arrays import FloatArray
+from workbench.compiled import compiled
 from workbench.mechanisms.friction import DriveFriction
 
 JOINTS = ("q1", "q2", "q3")
@@ -49,7 +49,7 @@ class Friction:
         return tau
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _limb(hinges, slide, s, y, sd, yd):  # type: ignore[no-untyped-def]
     """Force (along s, along y) at B that friction in a limb with B - A = (s, y) needs."""
     squared = s * s + y * y
@@ -59,7 +59,7 @@ def _limb(hinges, slide, s, y, sd, yd):  # type: ignore[no-untyped-def]
     return along * s - across * y, along * y + across * s
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def add_passive(c, lengths, x, xd, jacobian, tau):  # type: ignore[no-untyped-def]
     """Add to tau ``(n, 3)`` what friction in the passive joints costs."""
     a, b, h = lengths
