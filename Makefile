@@ -11,6 +11,7 @@ CAMPAIGN ?= campaigns/almeida_2010.toml
 # SLOW=1 adds the tests marked slow.
 SLOW ?=
 PYTEST_ARGS ?=
+BENCH_ARGS ?=
 # Campaigns whose reports are kept in reports/published.
 PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models
 
@@ -18,7 +19,7 @@ PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_model
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow test-browser reports lint format clean
+.PHONY: help setup run test test-slow test-browser reports bench lint format clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -69,6 +70,9 @@ reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings i
 	  cp -R build/reports/$$name/report.html build/reports/$$name/report.md build/reports/$$name/figures \
 	    reports/published/$$name || exit 1; \
 	done
+
+bench: $(STAMP) ## Measure speed, as ratios in one run (BENCH_ARGS=--quick to try it); results in benchmarks/results
+	$(BIN)/python benchmarks/run.py $(BENCH_ARGS)
 
 lint: $(STAMP) ## Check style and types
 	$(BIN)/ruff check .
