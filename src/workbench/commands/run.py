@@ -67,7 +67,6 @@ def run(
     from workbench.commands.sweeps import dry_run as print_dry_run
     from workbench.commands.sweeps import run_and_print
     from workbench.console import CaseProgress, print_outcome
-    from workbench.report import build_report
 
     values, relative = settings(set_ or [])
     effort = Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick)
@@ -95,6 +94,8 @@ def run(
             typer.echo(f"workbench: {stop}", err=True)
             raise
     else:
+        from workbench.report import build_report  # brings matplotlib, which no sweep needs
+
         with CaseProgress() as progress:
             outcome = run_campaign(
                 campaign,
