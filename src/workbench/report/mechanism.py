@@ -63,7 +63,7 @@ def mechanism_plot(run: Run, case: str, key: str, series: Series) -> Plot | None
 
     def draw(figure: FigureBase) -> None:
         for number, (view, box, limits) in enumerate(layout):
-            axes = _panel(figure, view, box, limits, labelled=number > 0)
+            axes = _panel(figure, view, box, limits, () if number else run.manifest.platform_axes)
             _draw_mechanism(axes, view, found, number)
 
     number = len(record.joints)
@@ -177,13 +177,13 @@ def _panel(
     view: View,
     box: tuple[float, float, float, float],
     limits: tuple[float, float, float, float],
-    labelled: bool,
+    triad: tuple[str, ...],
 ) -> Axes:
     axes = figure.add_axes(box)
     axes.set_xlim(limits[0], limits[1])
     axes.set_ylim(limits[2], limits[3])
     axes.set_box_aspect(box[3] * size_of(figure)[1] / (box[2] * size_of(figure)[0]))
-    if labelled:
+    if not triad:
         axes.locator_params(nbins=5)
         axes.set_xlabel(view.title)
         axes.set_ylabel("upwards [m]")
@@ -191,11 +191,11 @@ def _panel(
     axes.set_axis_off()
     length = 0.12 * (limits[1] - limits[0])
     origin = np.array([limits[0] + 0.14 * (limits[1] - limits[0]), limits[2] + 0.14 * (limits[3] - limits[2])])
-    for index, direction in enumerate(np.eye(3)):
+    for name, direction in zip(triad, np.eye(3), strict=False):
         tip = origin + length * view(direction)
         axes.plot(*np.stack([origin, tip]).T, color=INK, linewidth=0.8)
         x, y = origin + 1.35 * (tip - origin)
-        axes.text(x, y, f"x{index + 1}", fontsize=7.5, ha="center", va="center")
+        axes.text(x, y, name, fontsize=7.5, ha="center", va="center")
     return axes
 
 
