@@ -25,7 +25,18 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("reference",),
     ("mjcf",),
     ("mechanisms",),
-    ("motion", "metrics", "dry_friction", "staging", "compiled", "notices", "arrays", "errors", "data_files", "_version"),
+    (
+        "motion",
+        "metrics",
+        "dry_friction",
+        "staging",
+        "compiled",
+        "notices",
+        "arrays",
+        "errors",
+        "data_files",
+        "_version",
+    ),
 )
 """Top to bottom; a module may import its own layer and those below. The package's own __init__ may import any."""
 

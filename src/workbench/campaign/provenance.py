@@ -30,7 +30,7 @@ def _version(distribution: str) -> str:
 def machine() -> dict[str, str | int]:
     """System, processor and number of cores."""
     return {
-        "system": f"{platform.system()} {platform.release()}",
+        "system": f"{platform.system()} {platform.release().split('-')[0]}",
         "processor": platform.machine(),
         "cores": os.cpu_count() or 1,
     }
