@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from workbench.arrays import FloatArray, as_batch, as_batches
-from workbench.errors import ParameterError
+from workbench.errors import MotionError, ParameterError
 from workbench.mechanisms import asym_2rss_ppap_kernel as kernel
 from workbench.mechanisms.asym_2rss_ppap_candidates import CANDIDATES
 from workbench.mechanisms.asym_2rss_ppap_friction import Friction
@@ -175,6 +175,17 @@ class Asym2rssPpap(Mechanism):
         """Position, velocity and acceleration of the platform, each ``(n, 3)``, SI, paper frame."""
         x, xd, xdd, _, _ = self._motion(*as_batches(q=q, qd=qd, qdd=qdd))
         return x, xd, xdd
+
+    def mobility_count(self) -> dict[str, int]:
+        """Gogu's count, each dimension from the rank of screws; the paper states M = 3 without one."""
+        from workbench.mechanisms.asym_2rss_ppap_mobility import POSE, gogu_mobility
+
+        q = np.array(POSE)
+        try:
+            x = self.forward_kinematics(q[None, :])[0]
+        except MotionError:  # limbs that do not reach this pose; the count is structural and any pose tells it
+            return {}
+        return gogu_mobility(self._parameters, x, q)
 
     def joint_motion(self, x: ArrayLike, xd: ArrayLike, xdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Actuated motion from a platform motion, elbows out.
