@@ -6,6 +6,7 @@ import ctypes
 import shutil
 import subprocess
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,6 +42,21 @@ class Floor:
 
         bound.keeps = arrays  # type: ignore[attr-defined]
         return bound
+
+    def threads(self, robot: str, constants: np.ndarray, *arrays: np.ndarray) -> Callable[[], None]:
+        """Return the scalar form in two threads, a half each; ctypes lets go of the interpreter's lock."""
+        half = len(arrays[0]) // 2
+        parts = [
+            self.call(robot, False, constants, *(a[rows] for a in arrays)) for rows in (slice(half), slice(half, None))
+        ]
+        pool = ThreadPoolExecutor(1)
+
+        def both() -> None:
+            other = pool.submit(parts[1])
+            parts[0]()
+            other.result()
+
+        return both
 
 
 def build(directory: Path) -> Floor | None:
