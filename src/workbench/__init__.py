@@ -16,15 +16,19 @@ from workbench._version import __version__
 
 if TYPE_CHECKING:
     from workbench.errors import WorkbenchError
+    from workbench.mechanisms.registration import candidate
     from workbench.mjcf import load_mechanism
     from workbench.reference import MujocoReference
+    from workbench.report.frames import load_run
 
-__all__ = ["MujocoReference", "WorkbenchError", "__version__", "load_mechanism"]
+__all__ = ["MujocoReference", "WorkbenchError", "__version__", "candidate", "load_mechanism", "load_run"]
 
 _HOMES = {
     "MujocoReference": "workbench.reference",
     "WorkbenchError": "workbench.errors",
+    "candidate": "workbench.mechanisms.registration",
     "load_mechanism": "workbench.mjcf",
+    "load_run": "workbench.report.frames",
 }
 
 

@@ -14,6 +14,7 @@ import typer
 from workbench._version import __version__
 from workbench.commands.compare import compare
 from workbench.commands.model import model
+from workbench.commands.new import new
 from workbench.commands.report import report
 from workbench.commands.run import run
 from workbench.commands.status import status
@@ -60,6 +61,7 @@ def _root(
 
 app.command()(report)
 app.command()(run)
+app.command()(new)
 app.command()(status)
 app.command()(workspace)
 app.add_typer(model)

@@ -47,6 +47,10 @@ class OutputError(WorkbenchError):
     """Results cannot be written, or stored results cannot be read."""
 
 
+class CandidateError(WorkbenchError):
+    """A user's formula raises, takes too long, or returns something that is no torque."""
+
+
 class MissingExtraError(WorkbenchError):
     """An optional dependency is needed and not installed."""
 

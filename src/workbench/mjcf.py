@@ -23,6 +23,7 @@ from workbench.mechanisms.parameters import LARGEST_NUMBER, changed_parameters
 from workbench.mjcf_assumptions import Context, refuse_broken
 from workbench.mjcf_inertia import refuse_impossible_bodies
 from workbench.mjcf_safety import MAX_BYTES, read_text
+from workbench.mjcf_setup import Setup, prepare
 from workbench.mjcf_text import Element, scan
 from workbench.mjcf_values import read_parameters, rewrite
 
@@ -136,7 +137,9 @@ def custom_text(model: mujoco.MjModel, name: str) -> str | None:
     return bytes(model.text_data[start : start + model.text_size[index] - 1]).decode()
 
 
-def load_model(path: str | Path, overrides: Mapping[str, float] | None = None) -> LoadedModel:
+def load_model(
+    path: str | Path, overrides: Mapping[str, float] | None = None, setup: Setup | None = None
+) -> LoadedModel:
     """Load an MJCF, apply overrides, read the mechanism's parameters back and check the closed form's assumptions.
 
     Parameters
@@ -145,6 +148,8 @@ def load_model(path: str | Path, overrides: Mapping[str, float] | None = None) -
         An MJCF file, or ``models/NAME.xml`` of the models that come with the package.
     overrides
         Parameter values by name, SI; see `Mechanism.with_parameters`.
+    setup
+        What a campaign says about a file that names neither mechanism, actuators nor platform.
 
     Raises
     ------
@@ -155,6 +160,8 @@ def load_model(path: str | Path, overrides: Mapping[str, float] | None = None) -
     """
     file = str(path)
     text = read_text(find_model(path))
+    if setup:
+        text = prepare(text, file, setup, compile_text)
     if not overrides:
         return load_text(text, file)
     base = _read_once(text, file)

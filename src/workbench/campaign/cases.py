@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.campaign.generic import generic_mechanism
 from workbench.campaign.spec import (
     MAX_SAMPLES,
     Campaign,
@@ -21,12 +22,14 @@ from workbench.campaign.spec import (
     SineMotion,
     shorten,
 )
+from workbench.campaign.user_candidates import UserCandidate, offer
 from workbench.data_files import bundled, bundled_names
 from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
 from workbench.mechanisms.assignments import resolve_changes
 from workbench.mechanisms.base import Mechanism
 from workbench.mechanisms.parameters import SIDES
 from workbench.mjcf import LoadedModel, load_model
+from workbench.mjcf_setup import Setup
 from workbench.motion import (
     JointMotion,
     PickAndPlace,
@@ -56,6 +59,8 @@ class Case:
     """platform motion by the closed form, ``(n, 3)``"""
     loaded: LoadedModel | None = field(default=None, repr=False)
     """the model with the overrides, where it is at hand and need not be read again"""
+    setup: Setup | None = None
+    """what the campaign says about a mechanism of its own"""
 
     @property
     def name(self) -> str:
@@ -70,6 +75,7 @@ def resolve_cases(
     only: tuple[str, ...] = (),
     settings: Mapping[str, float] | None = None,
     relative: Sequence[str] = (),
+    users: Sequence[UserCandidate] = (),
 ) -> list[Case]:
     """Resolve every case: parameters (campaign, case, command line), model, motion, candidates.
 
@@ -85,6 +91,8 @@ def resolve_cases(
         Parameters from the command line; they go over all others.
     relative
         Changes like ``a2*=1.1``, each from what the parameter then is in the case.
+    users
+        Candidates of the user's own.
 
     Raises
     ------
@@ -101,7 +109,8 @@ def resolve_cases(
     def mechanism_with(overrides: Mapping[str, float]) -> Mechanism:
         key = tuple(sorted(overrides.items()))
         if key not in loaded:
-            loaded[key] = _mechanism(path, overrides)
+            loaded[key] = _mechanism(path, overrides, campaign)
+            offer(loaded[key], users)
         return loaded[key]
 
     cases = []
@@ -116,7 +125,7 @@ def resolve_cases(
                 overrides = layered(overrides, changes)
             mechanism = mechanism_with(overrides)
             _check_candidates(campaign, mechanism)
-            cases.append(_resolve(spec, file, path, overrides, mechanism))
+            cases.append(dataclasses.replace(_resolve(spec, file, path, overrides, mechanism), setup=campaign.setup))
         except WorkbenchError as error:
             raise _in_case(error, file, spec.name) from error
     return cases
@@ -139,7 +148,7 @@ def resolve_case(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, f
 
 @lru_cache(maxsize=1)
 def _unchanged(model: Path) -> Mechanism:
-    return _mechanism(model, {})
+    return _mechanism_of(load_model(model), model)
 
 
 def layered(*layers: Mapping[str, float]) -> dict[str, float]:
@@ -186,13 +195,22 @@ def locate(campaign_file: Path, name: str, what: str) -> Path:
     raise SpecError(f"{key}: no such file", **facts)
 
 
-def _mechanism(path: Path, overrides: Mapping[str, float]) -> Mechanism:
+def _mechanism(path: Path, overrides: Mapping[str, float], campaign: Campaign) -> Mechanism:
+    if campaign.setup:
+        if overrides:
+            raise ParameterError(
+                f"{path}: parameter {next(iter(overrides))} cannot be set; edit the MJCF, which both sides read"
+            )
+        return generic_mechanism(path, campaign.setup, tuple(campaign.read.items()))
     return _mechanism_of(load_model(path, overrides), path)
 
 
 def _mechanism_of(loaded: LoadedModel, path: Path) -> Mechanism:
     if loaded.mechanism is None:
-        raise SpecError(f'{path}: <custom> has no <text name="mechanism">, so there is no closed form to validate')
+        raise SpecError(
+            f'{path}: <custom> has no <text name="mechanism">, so there is no closed form to'
+            " validate; a mechanism of your own needs actuated and platform_site in the campaign"
+        )
     return loaded.mechanism
 
 
@@ -202,7 +220,8 @@ def _check_candidates(campaign: Campaign, mechanism: Mechanism) -> None:
             # forms that are wrong on purpose are not among those that a walk through the candidates shows
             known = {*mechanism.candidates, *getattr(mechanism.candidates, "on_purpose", ())}
             hint = did_you_mean(candidate.name, known)
-            raise SpecError(f'{mechanism.name} has no candidate "{candidate.name}"{hint}')
+            where = "; formulas of your own come from a Python file: --candidates FILE"
+            raise SpecError(f'{mechanism.name} has no candidate "{candidate.name}"{hint}{where}')
         if candidate.reference not in mechanism.mass_models:
             hint = did_you_mean(candidate.reference, mechanism.mass_models)
             raise SpecError(f'candidate "{candidate.name}": no reference "{candidate.reference}"{hint}')

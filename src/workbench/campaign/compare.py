@@ -13,9 +13,10 @@ from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case, at_time
 from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
 from workbench.campaign.spec import Campaign, CandidateSpec
+from workbench.campaign.torques import torques_of
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
-from workbench.campaign.verdict import CONTRAST, FAILURES, kind_of, verdict_of
-from workbench.errors import ArrayError, ModelError, MotionError
+from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdict_of
+from workbench.errors import ModelError, MotionError
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.raw_inverse import raw_mj_inverse
 from workbench.reference.skeleton import skeleton
@@ -85,32 +86,31 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         The model's platform is somewhere else than the closed form's.
     """
     motion, mechanism = case.motion, case.mechanism
-    reference = MujocoReference(case.model, threads=1, loaded=case.loaded, **case.overrides)
+    reference = MujocoReference(case.model, threads=1, loaded=case.loaded, setup=case.setup, **case.overrides)
     results: dict[str, ReferenceResult] = {}
     series = _motion_columns(case)
     try:
-        for mass_model in dict.fromkeys(c.reference for c in campaign.candidate):
+        for mass_model in dict.fromkeys(c.reference for c in campaign.candidate) or ("distributed",):
             results[mass_model] = reference.inverse_dynamics(motion.q, motion.qd, motion.qdd, mass_model, case.force)
-        torques: dict[str, FloatArray] = {}
-        for name in dict.fromkeys(c.name for c in campaign.candidate):
-            tau = mechanism.candidates[name].function(mechanism, motion.q, motion.qd, motion.qdd, case.force)
-            if tau.shape != motion.q.shape:
-                raise ArrayError(f'candidate "{name}": expected tau of shape {motion.q.shape}, got {tau.shape}')
-            torques[name] = tau
+        computed = torques_of(case, dict.fromkeys(c.name for c in campaign.candidate))
+        torques = computed.torques
     except MotionError as error:
         raise at_time(error, motion.t) from error
     _refuse_other_branch(case, next(iter(results.values())).x)
-    evidence = gather_evidence(case, reference, results, list(torques), effort)
+    sound = [name for name in torques if name not in computed.faults]
+    evidence = gather_evidence(case, reference, results, sound, effort)
     rows = [
         row
         for candidate in campaign.candidate
-        for row in _rows(case, candidate, torques[candidate.name], results[candidate.reference], evidence)
+        for row in _rows(case, candidate, computed.judged(candidate.name), results[candidate.reference], evidence)
     ]
+    rows = [dataclasses.replace(row, verdict=FAIL) if row.candidate in computed.faults else row for row in rows]
     if effort.budget:
         rows += _raw_rows(case, reference, results, evidence)
     for mass_model, result in results.items():
         series |= _columns(f"ref_{mass_model}", result.tau, mechanism.joints)
-    for name, tau in torques.items():
+    for name in sound:
+        tau = torques[name]
         series |= _columns(f"cand_{name}", tau, mechanism.joints)
     first = next(iter(results.values()))
     for joint, force in first.reactions.items():
@@ -122,7 +122,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for point, place in drawing.points.items():
             series |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
-    return CaseResult(case.name, rows, series, facts)
+    return CaseResult(case.name, rows, series, computed.noted(facts))
 
 
 def _refuse_other_branch(case: Case, x: FloatArray) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case, course_of
 from workbench.campaign.unloaded import joint_error, largest_reaction
-from workbench.errors import MotionError, SpecError, did_you_mean
+from workbench.errors import CandidateError, MotionError, SpecError, did_you_mean
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.power import PowerBalance, power_balance
 from workbench.reference.replay import Replay, ReplaySet, replay
@@ -132,7 +132,9 @@ def gather_evidence(
         The second engine cannot follow the motion.
     """
     motion, force = case.motion, case.force
-    spread = _spread(case, results) if PINOCCHIO in effort.engines else {}
+    # of excess actuators the second engine solves for one set of torques among many, not for that of least norm
+    second = PINOCCHIO in effort.engines and not reference.excess_actuators
+    spread = _spread(case, results) if second else {}
     if not effort.budget:
         return Evidence(spread=spread, times=motion.t)
     power = {
@@ -146,7 +148,7 @@ def _spread(case: Case, results: Mapping[str, ReferenceResult]) -> dict[str, dic
     from workbench.reference.pinocchio_reference import PinocchioReference
 
     motion = case.motion
-    engine = PinocchioReference(case.model, **case.overrides)
+    engine = PinocchioReference(case.model, setup=case.setup, **case.overrides)
     spread: dict[str, dict[str, float]] = {}
     for name, result in results.items():
         tau = engine.inverse_dynamics(motion.q, motion.qd, motion.qdd, name, case.force).tau
@@ -163,7 +165,14 @@ def _replays(case: Case, reference: MujocoReference, candidates: list[str]) -> R
 
     def torque_of(name: str) -> Any:
         function = mechanism.candidates[name].function
-        return lambda q, qd, qdd: function(mechanism, q, qd, qdd, np.tile(force, (len(q), 1)))
+
+        def torque(q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+            try:
+                return function(mechanism, q, qd, qdd, np.tile(force, (len(q), 1)))
+            except CandidateError:  # a user's formula may hold at the samples and fail between them
+                return np.full_like(q, np.nan)
+
+        return torque
 
     if len(motion.t) < 2:
         return None

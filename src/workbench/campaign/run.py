@@ -19,6 +19,7 @@ from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
 from workbench.campaign.spec import Campaign, load_campaign
+from workbench.campaign.user_candidates import load_candidates, with_rows
 from workbench.errors import SpecError, WorkbenchError
 from workbench.staging import check_output, staged
 
@@ -49,6 +50,7 @@ def run_campaign(
     progress: Progress | None = None,
     report: Callable[[Path], object] | None = None,
     effort: Effort = FULL,
+    candidates: Sequence[str | Path] = (),
 ) -> Outcome:
     """Run a campaign and write its run directory.
 
@@ -74,6 +76,8 @@ def run_campaign(
         Called with the directory when the results stand in it, before it is moved to its place.
     effort
         How much evidence is gathered beside the errors, and with which engines.
+    candidates
+        Python files, or installed entry points, with formulas of the user's own.
 
     Raises
     ------
@@ -87,7 +91,9 @@ def run_campaign(
     directory = out or Path("reports") / campaign.name
     check_output(directory, store.RUN)
     check_engines(effort.engines)
-    cases = resolve_cases(campaign, file, model, tuple(only), settings, relative)
+    users = load_candidates(candidates)
+    campaign = with_rows(campaign, users)
+    cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users)
     results: list[CaseResult] = []
     with locked(directory), staged(directory) as stage:
         for number, case in enumerate(cases):

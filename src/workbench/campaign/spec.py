@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
+from workbench.campaign.own_mechanism import OwnMechanism
 from workbench.campaign.schema import NAME_RULE, Finite, Name, Strict, Triple, Vector
 from workbench.campaign.sweep.spec import Filter, SweepSpec, Vary
 from workbench.data_files import bundled
@@ -176,7 +177,7 @@ class ClaimSpec(Strict):
     note: str = ""
 
 
-class Campaign(Strict):
+class Campaign(OwnMechanism):
     """A whole campaign file."""
 
     format: Literal[1] = 1
@@ -185,7 +186,8 @@ class Campaign(Strict):
     description: str = ""
     model: str
     parameters: dict[str, Finite] = Field(default_factory=dict)
-    candidate: Annotated[list[CandidateSpec], Field(min_length=1)]
+    candidate: list[CandidateSpec] = Field(default_factory=list)
+    """may be empty where the campaign brings its own mechanism: then the reference alone is computed"""
     case: Annotated[list[CaseSpec], Field(min_length=1)]
     claim: list[ClaimSpec] = Field(default_factory=list)
     figure: list[FigureSpec] = Field(default_factory=list)
@@ -326,6 +328,8 @@ def _place(place: list[int | str], document: Any) -> str:
 
 def _check_names(campaign: Campaign, file: str) -> None:
     """Names that have to be unique, and names that have to exist."""
+    if not campaign.candidate and campaign.actuated is None:
+        raise SpecError(f"{file}: candidate: missing; a campaign compares at least one", file=file)
     cases = [case.name for case in campaign.case]
     for name in cases:
         if cases.count(name) > 1:

@@ -33,6 +33,10 @@ def run(
     model: Annotated[
         Path | None, typer.Option(metavar="FILE", help="MJCF file in place of the campaign's own.")
     ] = None,
+    candidates: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE", help="Python file with formulas of your own, which is run; may be repeated."),
+    ] = None,
     engines: Annotated[
         str, typer.Option(metavar="LIST", help="mujoco, or mujoco,pinocchio to check the reference by a second engine.")
     ] = "mujoco",
@@ -75,6 +79,10 @@ def run(
     if (spec.sweep or dry_run) and (only or relative):
         what = "--only" if only else f'--set "{relative[0]}"'
         raise SpecError(f"{campaign}: {what} does not go with {'a sweep' if spec.sweep else '--dry-run'}")
+    if candidates and (spec.sweep or dry_run):
+        raise SpecError(f"{campaign}: --candidates does not go with {'a sweep' if spec.sweep else '--dry-run'}")
+    if spec.sweep and spec.setup:
+        raise SpecError(f"{campaign}: a sweep varies parameters of a built-in robot; actuated does not go with it")
     if dry_run:
         print_dry_run(spec, file, model, values, effort, jobs)
         return
@@ -108,6 +116,7 @@ def run(
                 progress=progress,
                 report=build_report,
                 effort=effort,
+                candidates=candidates or (),
             )
         print_outcome(outcome)
         passed = outcome.passed

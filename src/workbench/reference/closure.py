@@ -116,6 +116,16 @@ class LoopCloser:
         self._home = found
         self.home = found.qpos[0]
 
+    def jacobian(self, qpos: FloatArray) -> FloatArray:
+        """Constraint Jacobian ``(m, nv)`` of one configuration ``(nq,)``."""
+        return constraint_jacobian(self.engine, self.structure, self.joints, qpos[None, :])[0]
+
+    def jacobian_near_home(self, way: FloatArray) -> FloatArray:
+        """Constraint Jacobian of the closed pose that is nearest to home moved by a velocity ``(nv,)``."""
+        moved = np.empty_like(self.home)
+        integrate(self.home, way, self.joints, moved)
+        return self.jacobian(self._close_freely(moved[None, :])[0][0])
+
     def close(self, q: FloatArray) -> Assembly:
         """Close the loops for actuated coordinates ``(n, na)``, SI, any order of samples.
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,10 +19,13 @@ from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf import LoadedModel, custom_text, load_model
-from workbench.reference.closure import Assembly, LoopCloser, constraint_jacobian
+from workbench.mjcf_setup import Setup
+from workbench.reference.closure import Assembly, LoopCloser
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
+from workbench.reference.freedoms import check_freedoms
 from workbench.reference.kernels import projection, velocities
 from workbench.reference.reactions import named, reaction_rows
+from workbench.reference.redundant import excess_actuators, leading, shared
 from workbench.reference.structure import Structure, read_structure
 
 MASS_MODELS = ("distributed", "lumped")
@@ -36,14 +40,14 @@ class ReferenceResult:
     """Inverse dynamics of n samples; arrays float64, SI, platform quantities in the paper's (base body's) frame."""
 
     tau: FloatArray
-    """``(n, na)`` actuator forces (N) and torques (N m)"""
+    """``(n, na)`` actuator forces (N) and torques (N m); of least norm where there are more actuators than freedoms"""
     x: FloatArray
     """``(n, 3)`` platform position, m"""
     xd: FloatArray
     xdd: FloatArray
     reactions: dict[str, FloatArray]
     """force ``(n, 3)`` in N, base frame, that the parent exerts on the child body at each joint, and that the second
-    site's body exerts on the first's at each loop closure"""
+    site's body exerts on the first's at each loop closure; none where there are more actuators than freedoms"""
     closure_residual: FloatArray
     """``(n,)`` largest open loop coordinate, m (rad for turns)"""
     velocity_residual: FloatArray
@@ -84,6 +88,8 @@ class MujocoReference:
         Threads for MuJoCo's own work; results are the same, bit for bit, for any number.
     loaded
         The same model with the same overrides where it is at hand; it becomes the reference's own.
+    setup
+        Actuated joints, platform and first guess of a file whose ``<custom>`` does not name them.
     **parameters
         Overrides by name, SI, as for `workbench.load_mechanism`.
 
@@ -96,9 +102,15 @@ class MujocoReference:
     """
 
     def __init__(
-        self, path: str | Path, *, threads: int = 1, loaded: LoadedModel | None = None, **parameters: float
+        self,
+        path: str | Path,
+        *,
+        threads: int = 1,
+        loaded: LoadedModel | None = None,
+        setup: Setup | None = None,
+        **parameters: float,
     ) -> None:
-        loaded = loaded or load_model(path, parameters)
+        loaded = loaded or load_model(path, parameters, setup)
         self.file = loaded.file
         self._text = loaded.text
         self._threads = threads
@@ -109,6 +121,7 @@ class MujocoReference:
         tables = self._closer.tables
         self._tables = tables.closures, tables.joints, tables.split, tables.bodies
         self._reaction_rows = reaction_rows(loaded.model, self._structure)
+        self._leader: tuple[MujocoReference, np.ndarray] | None = None
         self._closed: tuple[FloatArray, Assembly] | None = None
         self._base_rotation = np.eye(3)
         self._locate_base()
@@ -118,6 +131,27 @@ class MujocoReference:
     def joint_names(self) -> tuple[str, ...]:
         """Actuated joints, in actuator order."""
         return self._structure.joint_names
+
+    @property
+    def actuated_slides(self) -> tuple[bool, ...]:
+        """Which actuated joints slide; the others turn."""
+        model = self._engines["distributed"].model
+        kinds = [model.jnt_type[model.dof_jntid[dof]] for dof in self._structure.actuated]
+        return tuple(bool(kind == mujoco.mjtJoint.mjJNT_SLIDE) for kind in kinds)
+
+    @property
+    def excess_actuators(self) -> int:
+        """Actuators beyond the freedoms; where there are any, tau is of least norm and no reactions are known."""
+        return len(self._structure.actuated) - len(self._leader[1]) if self._leader else 0
+
+    @property
+    def determining(self) -> tuple[MujocoReference, np.ndarray | slice]:
+        """The same model driven by as many actuators as there are freedoms, and their places among all."""
+        return self._leader or (self, slice(None))
+
+    def tangent(self, q: FloatArray) -> FloatArray:
+        """All velocities per actuated one, ``(n, nv, na)``."""
+        return self._assemble(q).tangent
 
     @property
     def text(self) -> str:
@@ -189,6 +223,8 @@ class MujocoReference:
         n = len(q)
         if n == 0:
             return self._no_samples(mass_model)
+        if self._leader:
+            return shared(*self._leader, structure, q, qd, qdd, mass_model, external_force)
         # for the kernels, arrays that may not be written to are another type
         qd, qdd = np.require(qd, requirements="W"), np.require(qdd, requirements="W")
         force = np.ascontiguousarray(as_force("external_force", external_force, n) @ self._base_rotation.T)
@@ -197,7 +233,8 @@ class MujocoReference:
         qpos, (qvel, qacc) = assembly.qpos, np.zeros((2, n, model.nv))
         tau, motion, energy = np.zeros_like(q), np.zeros((3, n, 3)), np.zeros((n, 2))
         velocity_residual, acceleration_residual = np.zeros((2, n))
-        reactions = np.zeros((max(self._reaction_rows.values()) + 1, n, 3))
+        # the kernel fills a row for every body, also for fixed ones that follow the last joint
+        reactions = np.zeros((len(structure.blocks) + model.nbody, n, 3))
         velocities(assembly.tangent, qd, qvel)
         site = structure.platform_site
         platform = int(model.site_bodyid[site]), site
@@ -275,23 +312,24 @@ class MujocoReference:
         self._base_position = data.xpos[self._structure.base].copy()
 
     def _home_jacobian(self) -> FloatArray:
-        home = self._closer.home[None, :]
-        return constraint_jacobian(self._engines["distributed"], self._structure, self._closer.joints, home)[0]
+        return self._closer.jacobian(self._closer.home)
 
     def _check_freedoms(self) -> None:
-        """Every passive freedom must follow from the actuated ones."""
-        passive = self._home_jacobian()[:, self._structure.passive]
-        values, vectors = np.linalg.svd(passive)[1:]
-        loose = passive.shape[1] - int(np.count_nonzero(values > 1e-9 * max(values, default=1.0)))
-        if loose:
-            direction = np.abs(vectors[-1])
-            joint = self._structure.dof_names[self._structure.passive[int(np.argmax(direction))]]
-            raise ModelError(
-                f'{self.file}: {loose} freedom(s) that no actuator holds, most of it in joint "{joint}"; add an'
-                " actuator or a constraint",
-                file=self.file,
-                joint=joint,
-            )
+        """Every passive freedom must follow from the actuated ones; there may be more actuators than needed."""
+        structure, home = self._structure, self._home_jacobian()
+        check_freedoms(structure, home, self._closer.jacobian_near_home)
+        if excess_actuators(home, structure.passive, structure.actuated):
+            columns, tables = leading(structure, home)
+            self._leader = self._led_by(dataclasses.replace(tables, home_qpos=self._closer.home)), columns
+
+    def _led_by(self, structure: Structure) -> MujocoReference:
+        """The same model, driven by fewer of its actuators."""
+        led = copy.copy(self)
+        led._structure, led._leader, led._closed = structure, None, None
+        led._closer = LoopCloser(self._engines["distributed"], structure)
+        tables = led._closer.tables
+        led._tables = tables.closures, tables.joints, tables.split, tables.bodies
+        return led
 
     def _refuse_singular(
         self, q: FloatArray, qd: FloatArray, rank: np.ndarray, residual: FloatArray, weakest: np.ndarray

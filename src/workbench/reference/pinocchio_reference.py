@@ -16,6 +16,7 @@ from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf import custom_text, load_model
+from workbench.mjcf_setup import Setup
 from workbench.reference.pinocchio_loops import PinocchioLoops
 from workbench.reference.pinocchio_reader import import_pinocchio, read, without_inertia
 from workbench.reference.structure import CONNECT, SPIN, WELD, read_structure
@@ -52,6 +53,8 @@ class PinocchioReference:
     ----------
     path
         MJCF file; ``<custom>`` names ``base_body``, ``platform_site`` and ``lumped_bodies``.
+    setup
+        Actuated joints, platform and first guess of a file whose ``<custom>`` does not name them.
     **parameters
         Overrides by name, SI, as for `workbench.load_mechanism`.
 
@@ -69,9 +72,9 @@ class PinocchioReference:
     Coulomb friction is its full value against the direction of motion, and zero at rest.
     """
 
-    def __init__(self, path: str | Path, **parameters: float) -> None:
+    def __init__(self, path: str | Path, *, setup: Setup | None = None, **parameters: float) -> None:
         self._pin = import_pinocchio()
-        loaded = load_model(path, parameters)
+        loaded = load_model(path, parameters, setup)
         self.file = loaded.file
         self._compiled = loaded.model
         structure = self._structure = read_structure(loaded.model, loaded.file)

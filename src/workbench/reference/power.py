@@ -209,7 +209,10 @@ def _difference(
     moved = (q + qd * times + 0.5 * qdd * times**2).swapaxes(0, 1).reshape(-1, q.shape[1])
     speed = (qd + qdd * times).swapaxes(0, 1).reshape(-1, q.shape[1])
     still = np.zeros_like(moved)
-    energy = reference.inverse_dynamics(moved, speed, still, mass_model).energy.sum(axis=1).reshape(n, len(WEIGHTS), 2)
+    # along the curve excess actuators would leave the mechanism's motions; the leading ones determine its state
+    solver, lead = reference.determining
+    moved, speed, still = moved[:, lead], speed[:, lead], still[:, lead]
+    energy = solver.inverse_dynamics(moved, speed, still, mass_model).energy.sum(axis=1).reshape(n, len(WEIGHTS), 2)
     rate: FloatArray = (energy[:, :, 0] - energy[:, :, 1]) @ np.array(WEIGHTS) / step
     return rate
 

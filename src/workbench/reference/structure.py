@@ -216,6 +216,11 @@ def _refuse_uncovered_friction(model: mujoco.MjModel, file: str) -> None:
             )
 
 
+def _off(model: mujoco.MjModel, flag: str) -> bool:
+    """Whether the model's ``<flag>`` disables something."""
+    return bool(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}").value)
+
+
 def _refuse_uncovered(model: mujoco.MjModel, file: str) -> None:
     """Refuse what the closed-chain inverse dynamics leaves out, so that no error is ever silent."""
     obj = mujoco.mjtObj
@@ -235,12 +240,12 @@ def _refuse_uncovered(model: mujoco.MjModel, file: str) -> None:
         name = _name(model, obj.mjOBJ_JOINT, joint)
         if mujoco.mjtJoint(model.jnt_type[joint]) == mujoco.mjtJoint.mjJNT_FREE:
             raise ModelError(f'{file}: joint "{name}" is free; hang the mechanism on one fixed base body', file=file)
-        if model.jnt_limited[joint]:
+        if model.jnt_limited[joint] and not _off(model, "limit"):
             raise ModelError(
                 f'{file}: joint "{name}" has a range {model.jnt_range[joint].tolist()}; limits are not covered',
                 file=file,
             )
-        if model.jnt_stiffness[joint]:
+        if model.jnt_stiffness[joint] and not _off(model, "spring"):
             value = float(model.jnt_stiffness[joint])
             raise ModelError(f'{file}: joint "{name}" has stiffness {value:g}; springs are not covered', file=file)
     _refuse_uncovered_friction(model, file)

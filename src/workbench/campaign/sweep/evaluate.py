@@ -85,7 +85,7 @@ class Context:
         """Compile what is compiled on first use, so that no case's time and memory are charged for it."""
         overrides = layered(self.campaign.parameters, self.campaign.case[0].parameters, self.settings)
         case = resolve_case(self.campaign.case[0], self.file, self.model, overrides)
-        reference = MujocoReference(case.model, threads=1, loaded=case.loaded, **overrides)
+        reference = MujocoReference(case.model, threads=1, loaded=case.loaded, setup=None, **overrides)
         q, qd, qdd = (values[:2] for values in (case.motion.q, case.motion.qd, case.motion.qdd))
         for mass_model in dict.fromkeys(c.reference for c in self.campaign.candidate):
             reference.inverse_dynamics(q, qd, qdd, mass_model)

@@ -1,0 +1,79 @@
+"""The decorator by which a user's Python file offers its own formulas as candidates.
+
+>>> @candidate("vector-loop", bound=1e-10)
+... def vector_loop(p, q, qd, qdd):
+...     return p.m * qdd
+
+The file runs only where a command line names it, ``workbench run ... --candidates my_model.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar, overload
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+MARK = "__workbench_candidate__"
+"""attribute of a function that was registered"""
+
+
+@dataclass(frozen=True)
+class Registration:
+    """What a user says about a formula."""
+
+    name: str
+    reference: str = "distributed"
+    bound: float | None = None
+    description: str = ""
+    source: str = ""
+
+
+@overload
+def candidate(name: Function, /) -> Function: ...
+@overload
+def candidate(
+    name: str | None = None,
+    /,
+    *,
+    reference: str = "distributed",
+    bound: float | None = None,
+    description: str = "",
+    source: str = "",
+) -> Callable[[Function], Function]: ...
+def candidate(
+    name: Any = None,
+    /,
+    *,
+    reference: str = "distributed",
+    bound: float | None = None,
+    description: str = "",
+    source: str = "",
+) -> Any:
+    """Register a function ``(parameters, q, qd, qdd) -> tau`` as a candidate.
+
+    Arrays are float64, SI, shape ``(n, na)``, in the order of the actuated joints; *parameters* has those of the
+    mechanism as attributes. A function with a fifth argument gets the external force ``(n, 3)`` in newtons too.
+
+    Parameters
+    ----------
+    name
+        The name that a campaign knows it by; the function's own where none is given.
+    reference
+        The reference mass model that it is held against where the campaign does not name it.
+    bound
+        Largest peak error allowed there; None makes it a measured modelling error.
+    description, source
+        One line each, for the report; the description is the docstring's first line where none is given.
+    """
+    if callable(name):
+        return candidate()(name)
+
+    def register(function: Function) -> Function:
+        text = description or (function.__doc__ or "").strip().partition("\n")[0]
+        mark = Registration(str(name or function.__name__), reference, bound, text, source)
+        setattr(function, MARK, mark)
+        return function
+
+    return register

@@ -1,0 +1,51 @@
+"""``workbench new``: what it writes runs at once, as it says; what it cannot do is one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import workbench as wb
+from small_campaign import Workbench
+
+
+@pytest.fixture
+def workbench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Workbench:
+    return Workbench(tmp_path, monkeypatch, capsys)
+
+
+@pytest.mark.parametrize("joints", [("crank",), ("left", "right")])
+def test_what_it_writes_runs_at_once(workbench: Workbench, joints: tuple[str, ...]) -> None:
+    options = [part for joint in joints for part in ("--actuated", joint)]
+    done = workbench("new", "mine", *options, "--loops", str(len(joints)))
+    assert done.code == 0, done.err
+    compile(Path("mine/test_mine.py").read_text(), "test_mine.py", "exec")
+    done = workbench("run", "mine/mine.toml", "--candidates", "mine/mine.py", "--out", "out")
+    assert done.code == 0, done.err
+    run = wb.load_run("out")
+    assert run.manifest.joints == joints
+    assert run.manifest.cases["first"].mobility == len(joints)
+    assert run.manifest.cases["first"].evidence.power_balance["distributed"].relative < 1e-8
+    assert 0 < run.summary["peak_error"].max() < 10
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("new", "a b"), 'DIR "a b"; allowed'),
+        (("new", "mine", "--actuated", "1x"), '--actuated "1x"; allowed'),
+        (("new", "mine", "--actuated", "elbow1"), "none called elbow1"),
+        (("new", "mine", "--loops", "2"), "--loops 2 with 1 driven joint"),
+        (("new", "full"), "full: exists and is not an empty directory"),
+    ],
+)
+def test_a_request_that_cannot_be_met_is_one_line(
+    workbench: Workbench, arguments: tuple[str, ...], message: str
+) -> None:
+    Path("full").mkdir()
+    Path("full/file").touch()
+    done = workbench(*arguments)
+    assert done.code == 2
+    assert message in done.err
+    assert not Path("mine").exists()

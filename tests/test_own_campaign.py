@@ -1,0 +1,198 @@
+"""A campaign with a mechanism and formulas of the user's own: what runs, what fails alone, what a message says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import workbench as wb
+from own_mechanisms import CAMPAIGN, FOURBAR
+from small_campaign import SMALL, Done, Workbench
+from workbench.campaign import user_candidates
+from workbench.errors import OutputError, SpecError
+
+MODEL = """
+import workbench
+import numpy as np
+"""
+
+
+@pytest.fixture
+def workbench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Workbench:
+    made = Workbench(tmp_path, monkeypatch, capsys)
+    made.write(FOURBAR, "fourbar.xml")
+    return made
+
+
+def run(workbench: Workbench, code: str | None, campaign: str = CAMPAIGN, *options: str) -> Done:
+    extra: tuple[str, ...] = ()
+    if code is not None:
+        extra = ("--candidates", workbench.write(MODEL + code, "mine.py"))
+    return workbench.run(campaign, "--out", "out", "--quick", *extra, *options)
+
+
+def test_the_reference_alone(workbench: Workbench) -> None:
+    done = workbench.run(CAMPAIGN, "--out", "out")
+    assert done.code == 0, done.err
+    found = wb.load_run("out")
+    case = found.manifest.cases["turn"]
+    assert case.mobility == 1
+    assert case.evidence.power_balance["distributed"].relative < 1e-9
+    assert {row.candidate for row in found.summary.itertuples()} == {"raw mj_inverse"}
+    assert found.parameters()["value"].tolist() == [0.3, 0.15, 9.81]
+
+
+def test_units_travel_with_the_frames(workbench: Workbench) -> None:
+    run(workbench, "@workbench.candidate\ndef mine(p, q, qd, qdd):\n    return qdd * p.m1\n")
+    found = wb.load_run("out")
+    series = found.series("turn")
+    units = series.attrs["units"]
+    assert units["qd1"] == "rad/s"
+    assert units["ref_distributed_crank"] == "N m"
+    assert units["cand_mine_crank"] == "N m"
+    assert set(units) == set(series.columns)
+    torques = found.torques("turn")
+    mine = torques[torques["name"] == "mine"]
+    assert np.array_equal(mine["value"], 0.3 * series["qdd1"])
+    assert found.summary.attrs["units"]["peak_reference"] == {"crank": "N m"}
+    with pytest.raises(OutputError, match='no case "turm"; did you mean "turn"'):
+        found.series("turm")
+
+
+FAULTS = {
+    "raises": ("    return p.nope * q", "(mine.py:7) AttributeError: 'Parameters' object has no attribute 'nope'"),
+    "wrong shape": ("    return q[:, 0]", "(mine.py:4) returns an array of shape (41,); expected (41, 1)"),
+    "not finite": ("    return np.where(q > 1.2, np.nan, q)", "(mine.py:4) returns nan for sample"),
+    "text": ("    return 'q'", "(mine.py:4) returns str; expected numbers"),
+    "complex": ("    return q * 1j", "(mine.py:4) returns complex"),
+    "writes": ("    q[0] = 0.0\n    return q", "(mine.py:7) ValueError: assignment destination is read-only"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_names_the_users_own_line_and_others_go_on(workbench: Workbench, name: str) -> None:
+    body, message = FAULTS[name]
+    code = f"@workbench.candidate\ndef bad(p, q, qd, qdd):\n    '''Wrong.'''\n{body}\n"
+    done = run(workbench, code + "@workbench.candidate('fine')\ndef fine(p, q, qd, qdd):\n    return 0 * q\n")
+    found = wb.load_run("out")
+    verdicts = {row.candidate: row.verdict for row in found.summary.itertuples()}
+    assert done.code == 1
+    assert verdicts == {"bad": "fail", "fine": "measured"}
+    # one line of the user's code is cut by the terminal's width, so ask the manifest
+    assert message in (found.manifest.cases["turn"].message or ""), found.manifest.cases["turn"].message
+
+
+def test_a_slow_one_is_named_and_an_endless_one_stopped(workbench: Workbench, monkeypatch: pytest.MonkeyPatch) -> None:
+    code = "import time\n@workbench.candidate\ndef slow(p, q, qd, qdd):\n    time.sleep(0.1)\n    return q\n"
+    run(workbench, code)
+    assert "is slow" in wb.load_run("out").manifest.cases["turn"].warnings[0]
+    monkeypatch.setattr(user_candidates, "LIMIT_S", 0.05)
+    done = run(workbench, "@workbench.candidate\ndef endless(p, q, qd, qdd):\n    while True:\n        p.m1\n")
+    message = wb.load_run("out").manifest.cases["turn"].message
+    assert done.code == 1
+    assert message is not None
+    assert "takes more than 0.05 s for 41 samples" in message
+    assert "mine.py:6" in message or "mine.py:7" in message
+
+
+def test_a_formula_runs_only_when_the_command_line_names_its_file(workbench: Workbench) -> None:
+    code = "open('ran', 'w').close()\n@workbench.candidate\ndef mine(p, q, qd, qdd):\n    return q\n"
+    workbench.write(MODEL + code, "mine.py")
+    campaign = CAMPAIGN.replace("[[case]]", '[[candidate]]\nname = "mine"\nreference = "distributed"\n[[case]]')
+    done = run(workbench, None, campaign)
+    assert done.code == 2
+    assert "--candidates FILE" in done.err
+    assert not Path("ran").exists()
+    assert run(workbench, code, campaign).code == 0
+    assert Path("ran").exists()
+
+
+def test_formulas_for_a_built_in_robot_get_its_parameters_and_the_force(workbench: Workbench) -> None:
+    code = (
+        "@workbench.candidate('mine', bound=1e-10)\ndef mine(p, q, qd, qdd, f):\n"
+        "    from workbench.mechanisms.asym_2rss_ppap import Asym2rssPpap\n"
+        "    return Asym2rssPpap(p).inverse_dynamics(q, qd, qdd, 'distributed', f)\n"
+    )
+    assert run(workbench, code, SMALL).code == 0
+    assert run(workbench, code.replace("f)\n", "-f)\n").replace("qdd, -f)", "qdd, f)"), SMALL).code == 1
+
+
+COMPLAINTS = {
+    "no such file": ("absent.py", None, "absent.py: no such Python file, nor an installed entry point"),
+    "not python": ("fourbar.xml", None, "its name ends in .py"),
+    "nothing registered": ("empty.py", "x = 1\n", "empty.py: no candidate is registered in it"),
+    "syntax": ("bad.py", "def f(:\n", "bad.py:1: invalid syntax"),
+    "fails on import": ("bad.py", "\n\n1 / 0\n", "bad.py:3: ZeroDivisionError"),
+    "signature": (
+        "bad.py",
+        "import workbench\n@workbench.candidate\ndef f(q):\n    return q\n",
+        "bad.py:2: a candidate is called as f(parameters, q, qd, qdd)",
+    ),
+    "twice": (
+        "bad.py",
+        "import workbench\n@workbench.candidate('a')\ndef f(p, q, qd, qdd): ...\n"
+        "@workbench.candidate('a')\ndef g(p, q, qd, qdd): ...\n",
+        'candidate "a" is registered twice',
+    ),
+    "bound": (
+        "bad.py",
+        "import workbench\n@workbench.candidate('a', bound=-1)\ndef f(p, q, qd, qdd): ...\n",
+        "bound = -1; allowed: a number > 0",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", COMPLAINTS)
+def test_a_file_of_formulas_that_cannot_be_used_is_one_line(workbench: Workbench, name: str) -> None:
+    file, text, message = COMPLAINTS[name]
+    if text is not None:
+        workbench.write(text, file)
+    done = run(workbench, None, CAMPAIGN, "--candidates", file)
+    assert done.code == 2
+    assert len(done.complaint) == 1
+    assert message in done.err
+    assert not Path("out").exists()
+
+
+SPEC = {
+    "platform missing": (('platform_site = "coupler"\n', ""), "actuated and platform_site go together"),
+    "neither": (
+        ('actuated = ["crank"]\nplatform_site = "coupler"\n', ""),
+        "initial goes with actuated and platform_site",
+    ),
+    "unknown quantity": (('"mass crank"', '"mas crank"'), 'm1 = "mas crank": unknown quantity; did you mean "mass"?'),
+    "unknown body": (('"mass crank"', '"mass crnk"'), 'no body "crnk"; did you mean "crank"?'),
+    "form": (('"offset coupler x"', '"offset coupler"'), 'allowed: "offset BODY x|y|z"'),
+    "axis": (('"offset coupler x"', '"offset coupler w"'), 'axis "w"; allowed: x, y, z'),
+    "parameters": (("[read]", "[parameters]\nm1 = 1.0\n[read]"), "parameter m1 cannot be set; edit the MJCF"),
+    "ignore": (("[read]", "[read]\n"), None),
+}
+
+
+@pytest.mark.parametrize("name", [name for name, entry in SPEC.items() if entry[1]])
+def test_a_campaign_that_cannot_be_used_is_one_line(workbench: Workbench, name: str) -> None:
+    (old, new), message = SPEC[name]
+    assert old in CAMPAIGN
+    done = run(workbench, None, CAMPAIGN.replace(old, new))
+    assert done.code == 2
+    assert len(done.complaint) == 1
+    assert str(message) in done.err
+
+
+def test_entry_points_are_known_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Entry:
+        name = "their-model"
+
+        @staticmethod
+        def load() -> object:
+            raise RuntimeError("of theirs")
+
+    monkeypatch.setattr(
+        user_candidates, "entry_points", lambda group: [Entry] if group == user_candidates.GROUP else []
+    )
+    with pytest.raises(SpecError, match="their-model: RuntimeError: of theirs"):
+        user_candidates.load_candidates(["their-model"])
+    with pytest.raises(SpecError, match='did you mean "their-model"'):
+        user_candidates.load_candidates(["their-modle"])

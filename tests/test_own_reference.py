@@ -1,0 +1,153 @@
+"""The reference on mechanisms that the workbench has never seen: redundant actuation, loose freedoms, the set-up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from own_mechanisms import FOURBAR, PARALLELOGRAM
+from workbench.errors import ModelError, MotionError, WorkbenchError
+from workbench.mjcf_setup import Setup
+from workbench.reference import MujocoReference
+from workbench.reference.power import power_balance
+
+GUESS = (("crank", 1.0), ("elbow", -0.5), ("wrist", -1.5))
+
+
+def reference(directory: Path, text: str, actuated: tuple[str, ...], **keys: object) -> MujocoReference:
+    path = directory / "model.xml"
+    path.write_text(text)
+    return MujocoReference(path, setup=Setup(actuated, "coupler", **keys))  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def single(tmp_path: Path) -> MujocoReference:
+    return reference(tmp_path, FOURBAR, ("crank",), initial=GUESS)
+
+
+def whole_turn(single: MujocoReference):  # type: ignore[no-untyped-def]
+    q = np.linspace(0.0, 6.0, 9)[:, None]
+    return single.inverse_dynamics(q, np.full_like(q, 3.0), np.ones_like(q))
+
+
+def test_the_file_need_name_nothing(single: MujocoReference) -> None:
+    found = whole_turn(single)
+    assert single.joint_names == ("crank",)
+    assert single.mobility().mobility == 1
+    assert found.closure_residual.max() < 1e-13
+    assert found.acceleration_residual.max() < 1e-12
+
+
+def test_torques_of_excess_actuators_have_least_norm_and_do_the_same_work(
+    tmp_path: Path, single: MujocoReference
+) -> None:
+    one = whole_turn(single)
+    two = reference(tmp_path, FOURBAR, ("crank", "wrist"), initial=GUESS)
+    assert two.excess_actuators == 1
+    q, qd, qdd = one.qpos[:, [0, 2]], one.qvel[:, [0, 2]], one.qacc[:, [0, 2]]
+    found = two.inverse_dynamics(q, qd, qdd)
+    per_crank = qd / 3.0
+    assert np.abs((found.tau * per_crank).sum(axis=1) - one.tau[:, 0]).max() < 1e-13
+    least = per_crank * (one.tau[:, 0] / (per_crank**2).sum(axis=1))[:, None]
+    assert np.abs(found.tau - least).max() < 1e-13
+    # torques of the crank alone do the same work too, and are not the least
+    alone = np.column_stack([one.tau[:, 0], np.zeros(len(q))])
+    assert np.abs(found.tau - alone).max() > 0.1
+    balance = power_balance(two, q, qd, qdd, "distributed", np.zeros((len(q), 3)))
+    assert balance.relative < 1e-9
+
+
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_what_excess_actuators_cannot_do_together_is_refused(
+    tmp_path: Path, single: MujocoReference, which: int
+) -> None:
+    one = whole_turn(single)
+    two = reference(tmp_path, FOURBAR, ("crank", "wrist"), initial=GUESS)
+    motion = [one.qpos[:, [0, 2]], one.qvel[:, [0, 2]], one.qacc[:, [0, 2]]]
+    motion[which] = motion[which] + [0.0, 1e-3]
+    with pytest.raises(MotionError, match="more actuators than freedoms"):
+        two.inverse_dynamics(*motion)
+
+
+def test_a_parallelogram_driven_at_both_cranks_shares_the_load_evenly(tmp_path: Path) -> None:
+    both = reference(
+        tmp_path, PARALLELOGRAM, ("left", "right"), initial=(("left", 1.0), ("right", 1.0), ("hinge", -1.0))
+    )
+    q = np.linspace(0.6, 1.4, 5)[:, None] * [1.0, 1.0]
+    tau = both.inverse_dynamics(q, 0 * q, 0 * q).tau
+    assert np.abs(tau[:, 0] - tau[:, 1]).max() < 1e-13
+    # weight of two cranks at half their length and of the coupler at the whole, on both motors
+    expected = 9.81 * 0.2 * np.cos(q[:, 0]) * (0.3 + 0.8) / 2
+    assert np.abs(tau[:, 0] - expected).max() < 1e-12
+
+
+REFUSED = {
+    "unactuated freedom": (
+        FOURBAR.replace('name="tip" pos="0.3 0 0"/>', 'name="off" pos="0.3 0 0"/>').replace(
+            "</body>\n  </body>",
+            '<body pos="0.3 0 0"><joint name="fifth" axis="0 1 0"/>'
+            '<geom size=".1" mass="1"/><site name="tip" pos="0.2 0 0"/></body></body>\n  </body>',
+            1,
+        ),
+        Setup(("crank",), "coupler", initial=(*GUESS, ("fifth", 1.0))),
+        r'1 freedom\(s\) that no actuator holds: with all of crank at rest, joint "\w+" by',
+    ),
+    "two branches": (
+        FOURBAR.replace('pos="0.5 0 0"/>', 'pos="0.9 0 0"/>'),
+        Setup(("crank",), "coupler"),
+        "two assembly branches meet",
+    ),
+    "cannot close": (FOURBAR.replace('pos="0.5 0 0"/>', 'pos="2.5 0 0"/>'), Setup(("crank",), "coupler"), "open by"),
+    "limits": (
+        FOURBAR.replace('name="elbow"', 'name="elbow" range="-3 3"'),
+        Setup(("crank",), "coupler", initial=GUESS),
+        "limits are not covered",
+    ),
+    "springs": (
+        FOURBAR.replace('name="elbow"', 'name="elbow" stiffness="3"'),
+        Setup(("crank",), "coupler", initial=GUESS),
+        "springs are not covered",
+    ),
+    "contacts": (
+        FOURBAR.replace('<option><flag contact="disable"/></option>', ""),
+        Setup(("crank",), "coupler", initial=GUESS),
+        "contacts are not covered",
+    ),
+    "free bodies": (
+        FOURBAR.replace("</worldbody>", '<body><freejoint name="loose"/><geom size=".1"/></body></worldbody>'),
+        Setup(("crank",), "coupler", initial=GUESS),
+        'joint "loose" is free',
+    ),
+    "tendons": (
+        FOURBAR.replace("<equality>", '<tendon><fixed><joint joint="crank" coef="1"/></fixed></tendon><equality>'),
+        Setup(("crank",), "coupler", initial=GUESS),
+        "tendon",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_not_covered_is_refused(tmp_path: Path, name: str) -> None:
+    text, setup, message = REFUSED[name]
+    assert text != FOURBAR
+    (tmp_path / "model.xml").write_text(text)
+    with pytest.raises(ModelError, match=message):
+        MujocoReference(tmp_path / "model.xml", setup=setup)
+
+
+@pytest.mark.parametrize("what", ["limits", "springs", "contacts", "free bodies", "tendons"])
+def test_what_is_not_covered_can_be_ignored(tmp_path: Path, single: MujocoReference, what: str) -> None:
+    expected = whole_turn(single).tau
+    found = reference(tmp_path, REFUSED[what][0], ("crank",), initial=GUESS, ignore=(what,))
+    assert np.abs(whole_turn(found).tau - expected).max() < 1e-12
+
+
+def test_a_free_body_that_a_loop_holds_cannot_be_ignored(tmp_path: Path) -> None:
+    text = FOURBAR.replace(
+        '<site name="ground" pos="0.5 0 0"/>',
+        '<body pos="0.5 0 0"><freejoint name="loose"/><geom size=".1"/><site name="ground"/></body>',
+    )
+    with pytest.raises(WorkbenchError, match='"loose" is free and a loop'):
+        reference(tmp_path, text, ("crank",), initial=GUESS, ignore=("free bodies",))
