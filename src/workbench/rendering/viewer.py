@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import threading
 import time
 
 import mujoco
@@ -13,6 +14,8 @@ from workbench.rendering.poses import Poses
 from workbench.rendering.system import refuse_without_display
 
 REFRESH_S = 1 / 60
+CLOSING_S = 5.0
+"""How long a closing window may take."""
 
 
 def view(poses: Poses, speed: float = 1.0) -> None:
@@ -39,6 +42,7 @@ def view(poses: Poses, speed: float = 1.0) -> None:
     _pose(poses, data, 0)
     duration = float(poses.times[-1] - poses.times[0])
     step = duration / max(len(poses.times) - 1, 1)
+    others = set(threading.enumerate())
     # the panels would hide most of the robot; Tab and Shift-Tab bring them
     with (
         contextlib.suppress(KeyboardInterrupt),
@@ -55,6 +59,9 @@ def view(poses: Poses, speed: float = 1.0) -> None:
             window.set_texts((None, None, poses.title, f"t = {poses.times[number]:.3f} s" if step else ""))
             window.sync()
             time.sleep(REFRESH_S)
+    # the window's thread still uses the model and the screen; a program that ends before it crashes
+    for thread in set(threading.enumerate()) - others:
+        thread.join(CLOSING_S)
 
 
 def _pose(poses: Poses, data: mujoco.MjData, number: int) -> None:
