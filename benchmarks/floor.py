@@ -73,7 +73,13 @@ def build(directory: Path) -> Floor | None:
 
 def _compile(compiler: str, options: tuple[str, ...], target: Path) -> tuple[str, str] | None:
     for libraries in LIBRARIES:
-        command = [compiler, *options, "-shared", "-fPIC", "-o", str(target), str(SOURCE), *libraries]
+        # compiled and linked in two steps: linked with -ffast-math, the library would switch off subnormal numbers in
+        # the whole process that loads it
+        part = target.with_suffix(".o")
+        object_file = [compiler, *options, "-fPIC", "-c", "-o", str(part), str(SOURCE)]
+        if subprocess.run(object_file, check=False, capture_output=True).returncode:
+            return None
+        command = [compiler, "-shared", "-o", str(target), str(part), *libraries]
         if subprocess.run(command, check=False, capture_output=True).returncode == 0:
             return str(target), " ".join([Path(compiler).name, *options, *libraries])
     return None
