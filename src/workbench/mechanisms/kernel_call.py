@@ -21,6 +21,9 @@ from workbench.mechanisms.blocks import BLOCK
 SAMPLES_PER_THREAD = 2048
 """Fewer are not worth waking a thread for: they take some 20 us."""
 
+LARGEST_PIECE = 256 * BLOCK
+"""samples that a thread takes at a time; some 400 us"""
+
 MOST_THREADS = 256
 
 
@@ -73,19 +76,24 @@ def fill_torques(
     """
     _ready(kernel, 2)
     n = len(q)
-    pieces = min(checked_threads(threads), n // SAMPLES_PER_THREAD)
-    if pieces <= 1:
+    workers = min(checked_threads(threads), n // SAMPLES_PER_THREAD)
+    if workers <= 1:
         bad = kernel(constants, q, qd, qdd, force, tau)
     else:
-        edges = [BLOCK * (n * k // pieces // BLOCK) for k in range(pieces)] + [n]
+        size = min(LARGEST_PIECE, BLOCK * -(-n // (workers * BLOCK)))
+        pieces = iter(range(0, n, size))
 
-        def part(k: int) -> int:
-            here = slice(edges[k], edges[k + 1])
-            some = force if len(force) == 1 else force[here]
-            return int(kernel(constants, q[here], qd[here], qdd[here], some, tau[here]))
+        def share() -> int:
+            found = 0
+            # threads take pieces as they get ready for them, so that one that is held up holds up no other
+            for first in pieces:
+                here = slice(first, first + size)
+                some = force if len(force) == 1 else force[here]
+                found += kernel(constants, q[here], qd[here], qdd[here], some, tau[here])
+            return found
 
-        others = [_pool(pieces - 1).submit(part, k) for k in range(1, pieces)]
-        bad = part(0) + sum(other.result() for other in others)
+        others = [_pool(workers - 1).submit(share) for _ in range(workers - 1)]
+        bad = share() + sum(other.result() for other in others)
     if bad:
         as_batches(q=q, qd=qd, qdd=qdd)
         as_batch("external_force", force)
