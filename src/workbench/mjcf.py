@@ -7,6 +7,7 @@ robot. Overrides are written into the text (in memory) and compiled again.
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -25,7 +26,7 @@ from workbench.mjcf_inertia import refuse_impossible_bodies
 from workbench.mjcf_safety import MAX_BYTES, read_text
 from workbench.mjcf_setup import Setup, prepare
 from workbench.mjcf_text import Element, scan
-from workbench.mjcf_values import read_parameters, rewrite
+from workbench.mjcf_values import quotient, read_parameters, rewrite, target_number, vector
 
 __all__ = [
     "MAX_BYTES",
@@ -172,9 +173,12 @@ def load_model(
         )
     wanted = changed_parameters(base.kind, base.values, overrides)
     refuse_impossible_bodies(base.model, base.kind, file, base.values, wanted)
-    loaded = load_text(rewrite(text, file, base.kind, base.values, wanted, base.elements), file)
-    confirm(loaded, wanted)
-    return loaded
+    text = rewrite(text, file, base.kind, base.values, wanted, base.elements)
+    model = compile_text(text, file)
+    confirm(model, base.kind, file, wanted)
+    # the file's structure was checked once; only numbers that are parameters' own have changed since
+    refuse_broken(Context(model, base.kind, file, text), wanted)
+    return LoadedModel(file, text, model, base.kind(base.kind.parameter_type(**wanted)), base.kind, wanted)
 
 
 def open_model(path: str | Path) -> LoadedModel:
@@ -246,23 +250,27 @@ def edit_text(
     return rewrite(text, file, mechanism, values, changed_parameters(mechanism, values, changes))
 
 
-def confirm(loaded: LoadedModel, wanted: Mapping[str, float]) -> None:
-    """Refuse an edited model that does not give back, bit for bit, the parameters that were asked for.
+def confirm(model: mujoco.MjModel, kind: type[Mechanism], file: str, wanted: Mapping[str, float]) -> None:
+    """Refuse an edited model that does not hold, bit for bit, the parameters that were asked for.
 
     Raises
     ------
     ModelError
         Naming the parameter: something in the file (a ``<compiler>`` option, a ``<frame>``) changes the numbers in it.
     """
-    assert loaded.values is not None
-    for name, value in wanted.items():
-        if loaded.values[name] != value:
+    for target in kind.targets:
+        if target.reads is None:
+            continue
+        found = float(vector(model, target, file)[target.index])
+        if found != target_number(target, wanted):
+            name = target.reads
+            value = quotient(found / target.factor, math.prod(wanted[other] for other in target.of if other != name))
             raise ModelError(
-                f"{loaded.file}: parameter {name} = {value!r} was written but reads back as {loaded.values[name]!r}; a"
+                f"{file}: parameter {name} = {wanted[name]!r} was written but reads back as {value!r}; a"
                 " <compiler> option or a <frame> of this file changes its numbers",
-                file=loaded.file,
+                file=file,
                 parameter=name,
-                value=loaded.values[name],
+                value=value,
             )
 
 

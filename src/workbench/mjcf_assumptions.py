@@ -14,7 +14,7 @@ import numpy as np
 from workbench.errors import ModelError
 from workbench.mechanisms.parameters import Target
 from workbench.mjcf_rules import ALIGNMENT, Assumption, Context
-from workbench.mjcf_structure import STRUCTURAL_CHECKS
+from workbench.mjcf_structure import STRUCTURAL_CHECKS, principal_axes
 from workbench.mjcf_values import target_number, vector
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ def numeric(context: Context, values: Mapping[str, float]) -> Iterator[Assumptio
             attributes.setdefault((target.element, target.name, target.attribute), {})[target.index] = target
     for (tag, element, attribute), targets in attributes.items():
         yield _numbers(context, tag, element, attribute, targets, values)
+    for info in context.layout.bodies:
+        if info.turns:
+            yield from principal_axes(context, info.name)
 
 
 def _numbers(

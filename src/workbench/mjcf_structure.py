@@ -204,11 +204,13 @@ def _body(context: Context, info: BodyInfo, body: int) -> Iterator[Assumption]:
         shift = shift - (shift @ axis) * axis
     if ("body", name, "pos") not in context.covered:
         yield vector_rule(context, "place", "body", name, "pos", shift, (0, 0, 0), AT_ZERO if info.joint else "")
-    if info.turns:
-        yield from _inertia(context, name, body)
 
 
-def _inertia(context: Context, name: str, body: int) -> Iterator[Assumption]:
+def principal_axes(context: Context, name: str) -> Iterator[Assumption]:
+    """The axes of a body that turns are its principal axes, by the measure of the inertia that it has now."""
+    body = context.index("body", name)
+    if body < 0:
+        return
     matrix = inertia_matrix(context.model, body)
     limit = ALIGNMENT * float(np.max(np.abs(np.diag(matrix))))
     off = max((matrix[0, 1], matrix[0, 2], matrix[1, 2]), key=abs)
