@@ -19,7 +19,7 @@ FLAGS = (
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Any]:
     """A browser without windows."""
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install '.[browser]'")
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install '.[dev]'")
     path = next((found for name in NAMES if (found := shutil.which(name))), None)
     if path is None:
         pytest.skip(f"no Chromium on this machine; looked for {', '.join(NAMES)} (apt-get install chromium)")
