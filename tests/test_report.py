@@ -22,6 +22,7 @@ import pytest
 from workbench.errors import OutputError
 from workbench.metrics import relative_error
 from workbench.report import build_report
+from workbench.report.cost import cost_table
 from workbench.report.load import load_run
 from workbench.report.text import error_fraction, escape_markdown, percent
 from workbench.report.verdict_section import verdict
@@ -804,3 +805,22 @@ def test_a_large_campaign_stays_small(tmp_path: Path) -> None:
     folder = make_run(tmp_path / "run", cases=10, samples=500)
     build_report(folder)
     assert (folder / "report.html").stat().st_size < 3e6
+
+
+def test_computing_cost_stands_beside_what_was_printed(tmp_path: Path) -> None:
+    def edit(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        first, second = list(manifest["candidates"].values())[:2]
+        first |= {"cost_us": 0.5, "printed_cost": {"us": 703.0, "source": "Scilab"}}
+        second |= {"cost_us": 0.25}
+
+    table = cost_table(load_run(make_run(tmp_path / "run", cases=1, samples=20, edit=edit)))
+    assert table is not None
+    assert [cell.text for cell in table.rows[0][2:]] == ["0.5", "703", "1,400", "Scilab"]
+    assert [cell.value for cell in table.rows[0][2:]] == [0.5, 703.0, 1406.0, None]
+    assert [cell.text for cell in table.rows[1][2:]] == ["0.25", "", "", ""]
+
+    def unmeasured(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        for record in manifest["candidates"].values():
+            del record["cost_us"]
+
+    assert cost_table(load_run(make_run(tmp_path / "other", cases=1, samples=20, edit=unmeasured))) is None

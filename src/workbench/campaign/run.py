@@ -142,6 +142,7 @@ def _manifest(
 ) -> dict[str, Any]:
     mechanism = cases[0].mechanism
     candidates = {c.name: mechanism.candidates[c.name] for c in campaign.candidate}
+    printed = {c.name: c.printed_cost for c in campaign.candidate if c.printed_cost}
     return describe(campaign, file, cases[0].model, mechanism) | {
         "format": store.FORMAT,
         "candidates": {
@@ -151,6 +152,7 @@ def _manifest(
                 "source": c.source,
                 "cost_us": cost_us(cases[0], name),
             }
+            | ({"printed_cost": printed[name].model_dump()} if name in printed else {})
             for name, c in candidates.items()
         }
         | ({RAW_INVERSE: RAW_DESCRIPTION} if any(row.candidate == RAW_INVERSE for row in rows) else {}),

@@ -93,6 +93,13 @@ class CsvMotion(Strict):
 Motion = Annotated[SineMotion | MultiSineMotion | CycleMotion | CsvMotion, Field(discriminator="kind")]
 
 
+class PrintedCost(Strict):
+    """What a formula's authors printed of its computing cost: microseconds per sample, beside what is measured."""
+
+    us: Annotated[Finite, Field(gt=0)]
+    source: str = ""
+
+
 class CandidateSpec(Strict):
     """A closed form, the reference mass model it is held against, and the bound on its peak error.
 
@@ -104,6 +111,7 @@ class CandidateSpec(Strict):
     bound: Annotated[Finite, Field(gt=0)] | None = None
     expect_fail: dict[str, Annotated[list[str], Field(min_length=1)]] = Field(default_factory=dict)
     """case -> joints whose error has to exceed the bound there; joints that are not named have to keep it"""
+    printed_cost: PrintedCost | None = None
 
     @model_validator(mode="after")
     def _failure_of_what(self) -> CandidateSpec:

@@ -15,6 +15,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from workbench.errors import OutputError
+from workbench.report.cost import cost_table
 from workbench.report.latex import latex_table
 from workbench.report.load import Run, load_run
 from workbench.report.pdf import all_tables, figure_pdf, report_pdf
@@ -105,7 +106,8 @@ def _rendered(run: Run, sections: list[Section], formats: Sequence[str]) -> dict
         files[run.directory / "report.html"] = render_html(run, sections).encode()
     if "pdf" in formats:
         files[run.directory / "report.pdf"] = report_pdf(run, sections)
-        for table in all_tables(sections):
+        costs = cost_table(run)
+        for table in (*all_tables(sections), *([costs] if costs else [])):
             files[run.directory / TABLES / f"{table.key}.tex"] = latex_table(table).encode()
     return files
 
@@ -126,6 +128,7 @@ def render_html(run: Run, sections: list[Section]) -> str:
     text = page.render(
         manifest=run.manifest,
         circumstances=circumstances(run),
+        costs=cost_table(run),
         sections=bodies,
         style=Markup(style + sheet.rules),
         script=Markup(script),
@@ -158,7 +161,7 @@ def render_markdown(run: Run, sections: list[Section]) -> str:
         for section in sections
     ]
     text = environment.get_template("report.md.j2").render(
-        manifest=run.manifest, circumstances=circumstances(run), sections=bodies
+        manifest=run.manifest, circumstances=circumstances(run), costs=cost_table(run), sections=bodies
     )
     return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"
 

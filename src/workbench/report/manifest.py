@@ -39,6 +39,13 @@ class ParameterRecord(Record):
     source: str = ""
 
 
+class PrintedCostRecord(Record):
+    """Microseconds per sample that a formula's authors printed."""
+
+    us: float
+    source: str = ""
+
+
 class CandidateRecord(Record):
     """One closed form and the mass model whose assumption it shares."""
 
@@ -47,6 +54,7 @@ class CandidateRecord(Record):
     source: str = ""
     cost_us: float | None = None
     """microseconds per sample, measured in the run"""
+    printed_cost: PrintedCostRecord | None = None
 
 
 class ClaimRecord(Record):

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
 
 from workbench.report.case_section import CaseView
+from workbench.report.cost import cost_table
 from workbench.report.load import Run
 from workbench.report.plot import Plot
 from workbench.report.section import Section
@@ -171,6 +172,8 @@ def report_pdf(run: Run, sections: Sequence[Section]) -> bytes:
             pages.lines(title, 15.0, bold=True)
             pages.lines(manifest.description, BODY, after=0.1)
             pages.lines(" ".join(circumstances(run)), SMALL_PRINT, after=0.2)
+            if costs := cost_table(run):
+                pages.table(costs)
             for section in sections:
                 _set_section(pages, section)
             pages.finish()

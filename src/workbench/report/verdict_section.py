@@ -41,19 +41,13 @@ def verdict_section(run: Run) -> Section:
 
 
 def circumstances(run: Run) -> tuple[str, ...]:
-    """Say when and where the run was made and what its formulas cost there: all that differs from run to run."""
+    """Say when and where the run was made: with what its formulas cost there, all that differs from run to run."""
     manifest = run.manifest
     machine = ", ".join(f"{key} {value}" for key, value in manifest.machine.items())
     seconds = "" if manifest.seconds is None else f", in {manifest.seconds:.1f} s"
-    costs = [
-        f"{name} {exact(candidate.cost_us, 2)} µs"
-        for name, candidate in manifest.candidates.items()
-        if candidate.cost_us is not None
-    ]
     told = [
         f"Run {manifest.started or 'at an unknown time'}{seconds}" + (f", on {machine}" if machine else ""),
         f"Git commit {manifest.git_commit}" if manifest.git_commit else "",
-        f"Cost per sample there: {', '.join(costs)}" if costs else "",
     ]
     return tuple(f"{text}." for text in told if text)
 
