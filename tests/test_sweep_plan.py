@@ -185,7 +185,10 @@ def test_a_dry_run_refuses_what_a_run_refuses(workbench: Workbench) -> None:
     assert 'did you mean "payload"?' in done.complaint[0]
 
 
-def test_only_does_not_go_with_a_sweep(workbench: Workbench) -> None:
-    done = workbench.run(SWEEP, "--only", "variant")
+@pytest.mark.parametrize("name", ["variant", "variant-000040", "variant-1", "other-000001", "variant-000001x"])
+def test_a_case_that_the_sweep_does_not_have(workbench: Workbench, name: str) -> None:
+    done = workbench.run(SWEEP, "--only", name)
     assert done.code == 2
-    assert done.complaint == ["workbench: small.toml: --only does not go with a sweep"]
+    assert done.complaint == [
+        f'workbench: small.toml: no case "{name}"; the sweep has variant-000000 to variant-000039'
+    ]

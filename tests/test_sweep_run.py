@@ -503,3 +503,22 @@ def test_a_cluster_whose_worker_is_killed_gives_the_same_bytes(workbench: Workbe
     nobody = workbench("run", name, "--out", "other", "--scheduler", "tcp://127.0.0.1:9")
     assert nobody.code == 2
     assert "scheduler tcp://127.0.0.1:9: nobody answers" in nobody.complaint[-1]
+
+
+def test_one_case_of_a_sweep_by_itself_has_the_same_numbers_and_all_evidence(workbench: Workbench) -> None:
+    name = workbench.write(SWEEP)
+    assert workbench("run", name, "--out", "run", "--jobs", "1").code == 0
+    errors = pd.read_parquet(workbench.directory / "run" / "summary")
+    case = errors[errors["kind"] == "modelling"].sort_values("peak_error")["case"].iloc[-1]
+    done = workbench("run", name, "--only", case)
+    assert done.code == 0, done
+    directory = workbench.directory / "reports" / "sweep-cases"
+    alone = pd.read_csv(directory / "summary.csv")
+    alone = alone[alone["kind"] != "contrast"]
+    expected = errors[errors["case"] == case]
+    assert len(expected) == len(alone) == 6
+    for column in ("candidate", "joint", "peak_error", "peak_reference", "worst_time_s"):
+        assert alone[column].tolist() == expected[column].tolist()
+    facts = manifest(directory)["cases"][case]
+    assert "Of the sweep: parameters." in facts["description"]
+    assert facts["evidence"]

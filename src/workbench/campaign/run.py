@@ -19,6 +19,7 @@ from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
 from workbench.campaign.spec import Campaign, load_campaign
+from workbench.campaign.sweep.pick import pick_cases
 from workbench.campaign.user_candidates import load_candidates, with_rows
 from workbench.errors import SpecError, WorkbenchError
 from workbench.staging import check_output, staged
@@ -59,11 +60,11 @@ def run_campaign(
     path
         Campaign file, or the name of a bundled one.
     out
-        Run directory; None is ``reports/<campaign name>``.
+        Run directory; None is ``reports/<campaign name>``, with ``-cases`` for cases of a sweep.
     model
         A model in place of the campaign's.
     only
-        Names of the cases to run; empty is all.
+        Names of the cases to run; empty is all. Of a sweep some have to be named.
     settings
         Parameters that go over those of campaign and cases.
     relative
@@ -86,9 +87,11 @@ def run_campaign(
     """
     started, clock = datetime.now(UTC), time.perf_counter()
     campaign, file = load_campaign(path)
+    directory = out or Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
     if campaign.sweep:
-        raise SpecError(f"{file}: has a sweep; workbench.campaign.sweep.run.run_sweep runs it")
-    directory = out or Path("reports") / campaign.name
+        if not only:
+            raise SpecError(f"{file}: has a sweep; workbench.campaign.sweep.run.run_sweep runs it")
+        campaign = pick_cases(campaign, file, model, settings or {}, only)
     check_output(directory, store.RUN)
     check_engines(effort.engines)
     users = load_candidates(candidates)

@@ -25,7 +25,9 @@ def run(
             help="Run directory; an earlier run in it is replaced, a sweep gone on with. Default: reports/NAME.",
         ),
     ] = None,
-    only: Annotated[list[str] | None, typer.Option(metavar="CASE", help="Run this case only; may be repeated.")] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="CASE", help="Run this case only, of a sweep too; may be repeated.")
+    ] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI; a2*=1.1 scales."),
@@ -76,17 +78,16 @@ def run(
     effort = Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick)
     command = ["workbench", *sys.argv[1:]]
     spec, file = load_campaign(campaign)
-    if (spec.sweep or dry_run) and (only or relative):
-        what = "--only" if only else f'--set "{relative[0]}"'
-        raise SpecError(f"{campaign}: {what} does not go with {'a sweep' if spec.sweep else '--dry-run'}")
-    if candidates and (spec.sweep or dry_run):
-        raise SpecError(f"{campaign}: --candidates does not go with {'a sweep' if spec.sweep else '--dry-run'}")
+    sweep = spec.sweep is not None and not only
+    for option, given in (("--only", only and dry_run), ("--set NAME*=FACTOR", relative), ("--candidates", candidates)):
+        if given and (sweep or dry_run):
+            raise SpecError(f"{campaign}: {option} does not go with {'--dry-run' if dry_run else 'a sweep'}")
     if spec.sweep and spec.setup:
         raise SpecError(f"{campaign}: a sweep varies parameters of a built-in robot; actuated does not go with it")
     if dry_run:
         print_dry_run(spec, file, model, values, effort, jobs)
         return
-    if spec.sweep:
+    if sweep:
         try:
             passed = run_and_print(
                 spec,
