@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -106,10 +106,10 @@ def resolve_cases(
             raise SpecError(f'{file}: no case "{name}"{did_you_mean(name, names)}', file=str(file), case=name)
     loaded: dict[tuple[tuple[str, float], ...], Mechanism] = {}
 
-    def mechanism_with(overrides: Mapping[str, float]) -> Mechanism:
+    def mechanism_once(overrides: Mapping[str, float]) -> Mechanism:
         key = tuple(sorted(overrides.items()))
         if key not in loaded:
-            loaded[key] = _mechanism(path, overrides, campaign)
+            loaded[key] = mechanism_with(path, overrides, campaign)
             offer(loaded[key], users)
         return loaded[key]
 
@@ -120,10 +120,10 @@ def resolve_cases(
         try:
             overrides = layered(campaign.parameters, spec.parameters, settings or {})
             if relative:
-                before = mechanism_with(overrides)
+                before = mechanism_once(overrides)
                 changes = resolve_changes(type(before), dataclasses.asdict(before.parameters), relative)
                 overrides = layered(overrides, changes)
-            mechanism = mechanism_with(overrides)
+            mechanism = mechanism_once(overrides)
             _check_candidates(campaign, mechanism)
             cases.append(dataclasses.replace(_resolve(spec, file, path, overrides, mechanism), setup=campaign.setup))
         except WorkbenchError as error:
@@ -131,24 +131,49 @@ def resolve_cases(
     return cases
 
 
-def resolve_case(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float]) -> Case:
-    """Resolve one case whose parameters are known, and whose candidates are.
+def resolve_case(
+    campaign: Campaign,
+    spec: CaseSpec,
+    file: Path,
+    model: Path,
+    overrides: dict[str, float],
+    users: Sequence[UserCandidate] = (),
+) -> Case:
+    """Resolve one of many cases of a campaign that differ in numbers only: what they share is made once.
 
     Raises
     ------
     ModelError, ParameterError, MotionError
         As `resolve_cases`, without the case's name.
     """
+    if campaign.setup:
+        if overrides:
+            raise _cannot_be_set(model, overrides)
+        own = _own(model, campaign.setup, tuple(campaign.read.items()), tuple(users))
+        return dataclasses.replace(_resolve(spec, file, model, {}, own), setup=campaign.setup)
     # out of reach is found without compiling; the loaded model gives the same parameters, bit for bit, or is refused
     planned = _unchanged(model).with_parameters(**overrides)
     case = _resolve(spec, file, model, overrides, planned)
     loaded = load_model(model, overrides)
-    return dataclasses.replace(case, loaded=loaded, mechanism=_mechanism_of(loaded, model))
+    mechanism = _mechanism_of(loaded, model)
+    offer(mechanism, users)
+    return dataclasses.replace(case, loaded=loaded, mechanism=mechanism)
 
 
 @lru_cache(maxsize=1)
 def _unchanged(model: Path) -> Mechanism:
     return _mechanism_of(load_model(model), model)
+
+
+@lru_cache(maxsize=1)
+def _own(model: Path, setup: Setup, read: tuple[tuple[str, str], ...], users: tuple[UserCandidate, ...]) -> Mechanism:
+    mechanism = generic_mechanism(model, setup, read)
+    offer(mechanism, users)
+    return mechanism
+
+
+def _cannot_be_set(model: Path, names: Iterable[str]) -> ParameterError:
+    return ParameterError(f"{model}: parameter {next(iter(names))} cannot be set; edit the MJCF, which both sides read")
 
 
 def layered(*layers: Mapping[str, float]) -> dict[str, float]:
@@ -195,12 +220,17 @@ def locate(campaign_file: Path, name: str, what: str) -> Path:
     raise SpecError(f"{key}: no such file", **facts)
 
 
-def _mechanism(path: Path, overrides: Mapping[str, float], campaign: Campaign) -> Mechanism:
+def mechanism_with(path: Path, overrides: Mapping[str, float], campaign: Campaign) -> Mechanism:
+    """Load the mechanism of a campaign's cases with parameters changed.
+
+    Raises
+    ------
+    ModelError, ParameterError, SpecError
+        See `resolve_cases`.
+    """
     if campaign.setup:
         if overrides:
-            raise ParameterError(
-                f"{path}: parameter {next(iter(overrides))} cannot be set; edit the MJCF, which both sides read"
-            )
+            raise _cannot_be_set(path, overrides)
         return generic_mechanism(path, campaign.setup, tuple(campaign.read.items()))
     return _mechanism_of(load_model(path, overrides), path)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +13,7 @@ from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case, at_time
 from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
 from workbench.campaign.spec import Campaign, CandidateSpec
-from workbench.campaign.torques import torques_of
+from workbench.campaign.torques import Fault, torques_of
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdict_of
 from workbench.errors import ModelError, MotionError
@@ -73,6 +73,8 @@ class CaseResult:
     rows: list[Row]
     series: dict[str, FloatArray] = field(repr=False)
     facts: dict[str, Any] = field(repr=False)
+    faults: Sequence[Fault] = ()
+    """what the user's candidates did wrong"""
 
 
 def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseResult:
@@ -122,7 +124,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for point, place in drawing.points.items():
             series |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
-    return CaseResult(case.name, rows, series, computed.noted(facts))
+    return CaseResult(case.name, rows, series, computed.noted(facts), tuple(computed.faults.values()))
 
 
 def _refuse_other_branch(case: Case, x: FloatArray) -> None:

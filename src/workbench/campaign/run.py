@@ -88,14 +88,14 @@ def run_campaign(
     started, clock = datetime.now(UTC), time.perf_counter()
     campaign, file = load_campaign(path)
     directory = out or Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
+    users = load_candidates(candidates)
+    campaign = with_rows(campaign, users)
     if campaign.sweep:
         if not only:
             raise SpecError(f"{file}: has a sweep; workbench.campaign.sweep.run.run_sweep runs it")
-        campaign = pick_cases(campaign, file, model, settings or {}, only)
+        campaign = pick_cases(campaign, file, model, settings or {}, only, users)
     check_output(directory, store.RUN)
     check_engines(effort.engines)
-    users = load_candidates(candidates)
-    campaign = with_rows(campaign, users)
     cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users)
     results: list[CaseResult] = []
     with locked(directory), staged(directory) as stage:

@@ -15,11 +15,20 @@ from workbench.errors import ArrayError, CandidateError
 
 
 @dataclass(frozen=True)
+class Fault:
+    """What a user's candidate did wrong; not the error itself, whose traceback would keep the whole case in memory."""
+
+    message: str
+    not_finite: bool
+    """it returned NaN or infinity, of the right shape"""
+
+
+@dataclass(frozen=True)
 class Computed:
     """Torques ``(n, na)`` by candidate, NaN where one failed, and what there is to say about it."""
 
     torques: dict[str, FloatArray] = field(default_factory=dict)
-    faults: dict[str, str] = field(default_factory=dict)
+    faults: dict[str, Fault] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
     def judged(self, name: str) -> FloatArray:
@@ -30,9 +39,15 @@ class Computed:
         """Return a case's facts with the faults and warnings in them; a fault fails the case."""
         if not self.faults and not self.warnings:
             return facts
-        noted = {**facts, "warnings": [*facts["warnings"], *self.faults.values(), *self.warnings]}
+        noted = {
+            **facts,
+            "warnings": [*facts["warnings"], *(fault.message for fault in self.faults.values()), *self.warnings],
+        }
         if self.faults:
-            messages = [*([facts["message"]] if facts["message"] else []), *self.faults.values()]
+            messages = [
+                *([facts["message"]] if facts["message"] else []),
+                *(fault.message for fault in self.faults.values()),
+            ]
             noted |= {"status": "failed", "message": "; ".join(messages)}
         return noted
 
@@ -53,7 +68,7 @@ def torques_of(case: Case, names: Iterable[str]) -> Computed:
         try:
             tau = function(mechanism, motion.q, motion.qd, motion.qdd, case.force)
         except CandidateError as error:
-            computed.faults[name] = str(error)
+            computed.faults[name] = Fault(str(error), "sample" in error.facts)
             tau = np.full_like(motion.q, np.nan)
         if tau.shape != motion.q.shape:
             raise ArrayError(f'candidate "{name}": expected tau of shape {motion.q.shape}, got {tau.shape}')

@@ -202,6 +202,11 @@ def load_candidates(names: Iterable[str | Path]) -> tuple[UserCandidate, ...]:
     return tuple(found)
 
 
+def full_names(names: Iterable[str | Path]) -> tuple[str, ...]:
+    """Names that mean the same in another process: whole paths of files, entry points as they are."""
+    return tuple(str(Path(name).resolve()) if Path(name).is_file() else str(name) for name in names)
+
+
 def _module(name: str) -> ModuleType:
     path = Path(name)
     installed = {entry.name: entry for entry in entry_points(group=GROUP)}

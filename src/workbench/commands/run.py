@@ -79,13 +79,11 @@ def run(
     command = ["workbench", *sys.argv[1:]]
     spec, file = load_campaign(campaign)
     sweep = spec.sweep is not None and not only
-    for option, given in (("--only", only and dry_run), ("--set NAME*=FACTOR", relative), ("--candidates", candidates)):
+    for option, given in (("--only", only and dry_run), ("--set NAME*=FACTOR", relative)):
         if given and (sweep or dry_run):
             raise SpecError(f"{campaign}: {option} does not go with {'--dry-run' if dry_run else 'a sweep'}")
-    if spec.sweep and spec.setup:
-        raise SpecError(f"{campaign}: a sweep varies parameters of a built-in robot; actuated does not go with it")
     if dry_run:
-        print_dry_run(spec, file, model, values, effort, jobs)
+        print_dry_run(spec, file, model, values, effort, jobs, candidates or ())
         return
     if sweep:
         try:
@@ -98,6 +96,7 @@ def run(
                 command=command,
                 effort=effort,
                 options=SweepOptions(jobs, scheduler, fresh, retry_failed),
+                candidates=candidates or (),
             )
         except SweepInterrupted as stop:
             typer.echo(f"workbench: {stop}", err=True)

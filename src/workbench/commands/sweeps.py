@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -86,11 +86,17 @@ class SweepProgress:
 
 
 def dry_run(
-    campaign: Campaign, file: Path, model: Path | None, settings: Mapping[str, float], effort: Effort, jobs: int | None
+    campaign: Campaign,
+    file: Path,
+    model: Path | None,
+    settings: Mapping[str, float],
+    effort: Effort,
+    jobs: int | None,
+    candidates: Sequence[str | Path] = (),
 ) -> None:
     """Print what a run would take; nothing is written."""
     check_engines(effort.engines)
-    found = estimate(campaign, file, model, settings, effort, jobs)
+    found = estimate(campaign, file, model, settings, effort, jobs, candidates)
     out.print(Text(f"{campaign.name}: {found.cases} cases, {found.samples} samples"))
     workers = "worker" if found.jobs == 1 else "workers"
     out.print(Text(f"  time: about {duration(found.seconds)} with {found.jobs} {workers}"))
@@ -111,6 +117,7 @@ def run_and_print(
     command: list[str],
     effort: Effort,
     options: SweepOptions,
+    candidates: Sequence[str | Path] = (),
 ) -> bool:
     """Run a sweep and print its outcome; return whether every case passed."""
     check_engines(effort.engines)
@@ -125,6 +132,7 @@ def run_and_print(
             show=progress,
             effort=effort,
             options=options,
+            candidates=candidates,
         )
     print_sweep(outcome)
     return outcome.passed

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from workbench.campaign.sweep.identity import common_key
 from workbench.campaign.sweep.plan import plan_sweep
 from workbench.campaign.sweep.record import FILTERED, GOOD
 from workbench.campaign.sweep.run import cores, task_of
+from workbench.campaign.user_candidates import UserCandidate, full_names, load_candidates, with_rows
 
 TRIED = 24
 """Cases of a sweep that are computed for an estimate, spread over it."""
@@ -44,7 +45,13 @@ class Estimate:
 
 
 def estimate(
-    campaign: Campaign, file: Path, model: Path | None, settings: Mapping[str, float], effort: Effort, jobs: int | None
+    campaign: Campaign,
+    file: Path,
+    model: Path | None,
+    settings: Mapping[str, float],
+    effort: Effort,
+    jobs: int | None,
+    candidates: Sequence[str | Path] = (),
 ) -> Estimate:
     """Estimate a campaign; everything in it is resolved and checked as for a run, and nothing is written.
 
@@ -53,19 +60,22 @@ def estimate(
     WorkbenchError
         As for a run.
     """
+    names = full_names(candidates)
+    users = load_candidates(names)
+    campaign = with_rows(campaign, users)
     if campaign.sweep is None:
-        return _of_cases(campaign, file, model, settings, effort)
+        return _of_cases(campaign, file, model, settings, effort, users)
     effort = Effort(effort.engines, budget=campaign.sweep.budget, drawing=False)
-    plan = plan_sweep(campaign, file, model, settings)
-    common = common_key(campaign, file, plan.model, settings, effort, campaign.sweep.keep_series)
-    context = Context(campaign, file, plan.model, settings, effort, plan.recipe, common)
+    plan = plan_sweep(campaign, file, model, settings, users)
+    common = common_key(campaign, file, plan.model, settings, effort, campaign.sweep.keep_series, users)
+    context = Context(campaign, file, plan.model, settings, effort, plan.recipe, common, names)
     indices = np.unique(np.linspace(0, plan.count - 1, TRIED).astype(int)).tolist()
-    evaluate(context, task_of(plan, indices[0]))  # the first one compiles
+    evaluate(context, users, task_of(plan, indices[0]))  # the first one compiles
     taken: list[float] = []
     lines = series = filtered = failed = 0
     for index in indices:
         begun = time.perf_counter()
-        answer = evaluate(context, task_of(plan, index))
+        answer = evaluate(context, users, task_of(plan, index))
         taken.append(time.perf_counter() - begun)
         lines += len(answer.record.line())
         series += len(answer.series or b"")
@@ -98,9 +108,14 @@ def _samples(campaign: Campaign) -> int:
 
 
 def _of_cases(
-    campaign: Campaign, file: Path, model: Path | None, settings: Mapping[str, float], effort: Effort
+    campaign: Campaign,
+    file: Path,
+    model: Path | None,
+    settings: Mapping[str, float],
+    effort: Effort,
+    users: Sequence[UserCandidate],
 ) -> Estimate:
-    cases = resolve_cases(campaign, file, model, (), settings)
+    cases = resolve_cases(campaign, file, model, (), settings, (), users)
     samples = sum(len(case.motion.t) for case in cases)
     short = min(cases, key=lambda case: len(case.motion.t))
     begun = time.perf_counter()

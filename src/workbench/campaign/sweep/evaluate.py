@@ -7,7 +7,7 @@ import dataclasses
 import hashlib
 import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from workbench.campaign.spec import Campaign
 from workbench.campaign.sweep.identity import case_key, common_key
 from workbench.campaign.sweep.plan import Recipe
 from workbench.campaign.sweep.record import FAILED, FILTERED, INVALID, PASSED, Record, lost
+from workbench.campaign.user_candidates import UserCandidate, load_candidates
 from workbench.campaign.verdict import FAILURES
 from workbench.errors import MotionError, WorkbenchError
 from workbench.reference import MujocoReference
@@ -59,6 +60,8 @@ class Context:
     recipe: Recipe
     common: str
     """`identity.common_key` of the run; a worker whose own differs computes nothing"""
+    candidates: tuple[str, ...] = ()
+    """files and entry points of the user's own formulas"""
 
     @property
     def keep_series(self) -> str:
@@ -74,25 +77,26 @@ class Context:
         WorkbenchError
             The model or a version differs here, on another machine for instance.
         """
-        here = common_key(self.campaign, self.file, self.model, self.settings, self.effort, self.keep_series)
+        users = load_candidates(self.candidates)
+        here = common_key(self.campaign, self.file, self.model, self.settings, self.effort, self.keep_series, users)
         if here != self.common:
             raise WorkbenchError("model, code or versions of this worker are not those of the run")
         with contextlib.suppress(WorkbenchError):
-            self._warm_up()
-        return partial(evaluate, self)
+            self._warm_up(users)
+        return partial(evaluate, self, users)
 
-    def _warm_up(self) -> None:
+    def _warm_up(self, users: Sequence[UserCandidate]) -> None:
         """Compile what is compiled on first use, so that no case's time and memory are charged for it."""
         overrides = layered(self.campaign.parameters, self.campaign.case[0].parameters, self.settings)
-        case = resolve_case(self.campaign.case[0], self.file, self.model, overrides)
-        reference = MujocoReference(case.model, threads=1, loaded=case.loaded, setup=None, **overrides)
+        case = resolve_case(self.campaign, self.campaign.case[0], self.file, self.model, overrides, users)
+        reference = MujocoReference(case.model, threads=1, loaded=case.loaded, setup=case.setup, **overrides)
         q, qd, qdd = (values[:2] for values in (case.motion.q, case.motion.qd, case.motion.qdd))
         for mass_model in dict.fromkeys(c.reference for c in self.campaign.candidate):
             reference.inverse_dynamics(q, qd, qdd, mass_model)
             case.mechanism.inverse_dynamics(q, qd, qdd, mass_model)
 
 
-def evaluate(context: Context, task: Task) -> Answer:
+def evaluate(context: Context, users: Sequence[UserCandidate], task: Task) -> Answer:
     """Compute one case; errors come back as data.
 
     Raises
@@ -108,7 +112,7 @@ def evaluate(context: Context, task: Task) -> Answer:
         spec = context.recipe.case_spec(index, numbers)
         overrides = layered(context.campaign.parameters, spec.parameters, context.settings)
         try:
-            case = resolve_case(spec, context.file, context.model, overrides)
+            case = resolve_case(context.campaign, spec, context.file, context.model, overrides, users)
         except MotionError as error:
             status = FILTERED if filters and filters.inside_workspace else FAILED
             return Answer(lost(index, key, status, str(error)))
@@ -147,6 +151,9 @@ def _nearest_singularity(case: Case) -> tuple[float, str]:
 
 
 def _judge(result: CaseResult) -> tuple[str, str]:
+    if result.faults:
+        not_finite = all(fault.not_finite for fault in result.faults)
+        return INVALID if not_finite else FAILED, "; ".join(fault.message for fault in result.faults)
     for row in result.rows:
         for column in MEASURED:
             value = getattr(row, column)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from workbench.campaign import provenance
 from workbench.campaign.cases import locate
 from workbench.campaign.evidence import Effort
 from workbench.campaign.spec import Campaign
+from workbench.campaign.user_candidates import UserCandidate
 
 FORMAT = 1
 """Version of the files of a sweep and of its keys."""
@@ -41,7 +42,13 @@ def versions() -> dict[str, str]:
 
 
 def common_key(
-    campaign: Campaign, file: Path, model: Path, settings: Mapping[str, float], effort: Effort, keep_series: str
+    campaign: Campaign,
+    file: Path,
+    model: Path,
+    settings: Mapping[str, float],
+    effort: Effort,
+    keep_series: str,
+    users: Sequence[UserCandidate] = (),
 ) -> str:
     """Hash of everything that the cases of a sweep share."""
     motion = campaign.case[0].motion
@@ -59,6 +66,9 @@ def common_key(
             "budget": effort.budget,
             "filter": filters,
             "keep_series": keep_series,
+            "setup": repr(campaign.setup),
+            "read": campaign.read,
+            "users": {user.name: provenance.sha256(user.file.read_bytes()) for user in users},
         }
     )
 

@@ -8,11 +8,17 @@ from pathlib import Path
 
 from workbench.campaign.spec import Campaign, shorten
 from workbench.campaign.sweep.plan import DIGITS, Plan, plan_sweep
+from workbench.campaign.user_candidates import UserCandidate
 from workbench.errors import SpecError
 
 
 def pick_cases(
-    campaign: Campaign, file: Path, model: Path | None, settings: Mapping[str, float], names: Sequence[str]
+    campaign: Campaign,
+    file: Path,
+    model: Path | None,
+    settings: Mapping[str, float],
+    names: Sequence[str],
+    users: Sequence[UserCandidate] = (),
 ) -> Campaign:
     """Return a campaign without a sweep that holds the named cases of it, with the numbers that they have there.
 
@@ -21,7 +27,7 @@ def pick_cases(
     SpecError
         A name that the sweep does not have; or as `plan_sweep`.
     """
-    plan = plan_sweep(campaign, file, model, settings)
+    plan = plan_sweep(campaign, file, model, settings, users)
     cases = []
     for index in dict.fromkeys(_index(plan, name, file) for name in names):
         numbers = plan.numbers(index)

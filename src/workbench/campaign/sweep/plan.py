@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from workbench.arrays import FloatArray
-from workbench.campaign.cases import layered, locate, resolve_cases
+from workbench.campaign.cases import layered, locate, mechanism_with, resolve_cases
 from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.sweep.samples import sweep_values
 from workbench.campaign.sweep.vary import Change, resolve_key
+from workbench.campaign.user_candidates import UserCandidate
 from workbench.errors import MotionError, SpecError
 from workbench.mechanisms.base import Mechanism
-from workbench.mjcf import load_model
 
 DIGITS = 6
 
@@ -75,7 +75,13 @@ class Plan:
         return self.recipe.case_dict(index, self.numbers(index))
 
 
-def plan_sweep(campaign: Campaign, file: Path, model: Path | None, settings: Mapping[str, float]) -> Plan:
+def plan_sweep(
+    campaign: Campaign,
+    file: Path,
+    model: Path | None,
+    settings: Mapping[str, float],
+    users: Sequence[UserCandidate] = (),
+) -> Plan:
     """Resolve a campaign with a sweep: every key, every name; nothing is computed.
 
     Raises
@@ -87,16 +93,19 @@ def plan_sweep(campaign: Campaign, file: Path, model: Path | None, settings: Map
     base = campaign.case[0]
     path = model or locate(file, campaign.model, "model")
     try:
-        mechanism = resolve_cases(campaign, file, model, (), settings)[0].mechanism
+        mechanism = resolve_cases(campaign, file, model, (), settings, (), users)[0].mechanism
     except MotionError:  # the case as it stands need not be within reach; its variants may be
-        loaded = load_model(path, layered(campaign.parameters, base.parameters, settings))
-        if loaded.mechanism is None:
-            raise
-        mechanism = loaded.mechanism
+        mechanism = mechanism_with(path, layered(campaign.parameters, base.parameters, settings), campaign)
     values = {name: float(value) for name, value in vars(mechanism.parameters).items()}
     case = base.model_dump()
     changes = []
     for vary in campaign.sweep.vary:
+        if campaign.setup and vary.key.startswith("parameters."):
+            raise SpecError(
+                f'{file}: sweep: key "{vary.key}": parameters of this MJCF cannot be set; allowed: motion,'
+                " external_force, speed",
+                key=vary.key,
+            )
         try:
             change = resolve_key(vary, case, mechanism.parameter_table, values)
         except SpecError as error:

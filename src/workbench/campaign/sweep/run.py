@@ -25,6 +25,7 @@ from workbench.campaign.sweep.progress import Meter, Show
 from workbench.campaign.sweep.record import lost
 from workbench.campaign.sweep.statistics import passed, summarise
 from workbench.campaign.sweep.supervisor import Lost, Setup, Supervisor
+from workbench.campaign.user_candidates import full_names, load_candidates, with_rows
 from workbench.errors import OutputError
 from workbench.staging import check_output
 
@@ -106,6 +107,7 @@ def run_sweep(
     report: Callable[[Path], object] | None = None,
     effort: Effort,
     options: SweepOptions,
+    candidates: Sequence[str | Path] = (),
 ) -> SweepOutcome:
     """Run a sweep, or what is missing of it.
 
@@ -123,6 +125,8 @@ def run_sweep(
         Engines; the budget is the sweep's own.
     options
         Workers, and what is done with an earlier run.
+    candidates
+        As for `run_campaign`; each worker loads them for itself.
 
     Raises
     ------
@@ -133,10 +137,16 @@ def run_sweep(
     """
     started, clock = datetime.now(UTC), time.perf_counter()
     assert campaign.sweep is not None
+    keep_series = campaign.sweep.keep_series
     effort = Effort(effort.engines, budget=campaign.sweep.budget, drawing=False)
-    plan = plan_sweep(campaign, file, model, settings or {})
-    common = common_key(campaign, file, plan.model, settings or {}, effort, campaign.sweep.keep_series)
-    context = Context(campaign, file.resolve(), plan.model.resolve(), dict(settings or {}), effort, plan.recipe, common)
+    names = full_names(candidates)
+    users = load_candidates(names)
+    campaign = with_rows(campaign, users)
+    plan = plan_sweep(campaign, file, model, settings or {}, users)
+    common = common_key(campaign, file, plan.model, settings or {}, effort, keep_series, users)
+    context = Context(
+        campaign, file.resolve(), plan.model.resolve(), dict(settings or {}), effort, plan.recipe, common, names
+    )
     with locked(directory):
         done = 0
         try:
