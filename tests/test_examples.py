@@ -17,6 +17,7 @@ EXAMPLES = {
     "fivebar": ("w**2", "1.0001 * w**2"),
     "delta": ("p.If / p.lz**2", "1.0001 * p.If / p.lz**2"),
     "bricard": ("slope * qdd", "1.0001 * slope * qdd"),
+    "orthoglide": ("2 * sin * swing * shear", "-2 * sin * swing * shear"),
 }
 
 
@@ -43,6 +44,16 @@ def test_an_example_holds_and_its_spoiled_twin_does_not(repository: Path, tmp_pa
     assert summary[summary["kind"] == "verification"]["peak_error"].max() > 1e-10
 
 
+def test_two_points_for_the_legs_of_the_orthoglide_are_a_modelling_error_of_some_percent(
+    repository: Path, tmp_path: Path
+) -> None:
+    directory = tmp_path / "orthoglide"
+    shutil.copytree(repository / "examples" / "orthoglide", directory)
+    summary = run(directory, "orthoglide", directory / "orthoglide.py").summary
+    error = summary[summary["candidate"] == "two_points"]["peak_error"]
+    assert 0.005 < error.min() < error.max() < 0.055
+
+
 def test_codoureys_split_is_a_modelling_error_of_some_percent(repository: Path, tmp_path: Path) -> None:
     directory = tmp_path / "delta"
     shutil.copytree(repository / "examples" / "delta", directory)
@@ -51,8 +62,35 @@ def test_codoureys_split_is_a_modelling_error_of_some_percent(repository: Path, 
     assert 0.02 < error.min() < error.max() < 0.08
 
 
-def test_bricards_redundant_rows_are_counted(repository: Path, tmp_path: Path) -> None:
-    directory = tmp_path / "bricard"
-    shutil.copytree(repository / "examples" / "bricard", directory)
-    case = run(directory, "bricard", directory / "bricard.py").manifest.cases["swing"]
-    assert (case.mobility, case.rank, case.redundant_rows) == (1, 4, 2)
+ORTHOGLIDE_FAULTS = {
+    "fork and yoke do not turn": ("2 * p.Jb, p.If + p.Iy)", "2 * p.Jb, 0.0)"),
+    "bars do not spin": ("2 * p.Jb, p.If", "0.0, p.If"),
+    "gyroscopic term's sign": ("- slope * swing**2 / 2", "+ slope * swing**2 / 2"),
+    "cutting force reversed": ("sum(axis=1) - force", "sum(axis=1) + force"),
+    "other branch": ("-(1 + np.sqrt", "-(1 - np.sqrt"),
+    "centripetal term": ("dot(leg, slider) - dot(leg_rate, leg_rate)", "dot(leg, slider) + dot(leg_rate, leg_rate)"),
+}
+
+
+@pytest.mark.parametrize("name", ORTHOGLIDE_FAULTS)
+def test_each_term_of_the_orthoglide_is_seen(repository: Path, tmp_path: Path, name: str) -> None:
+    directory = tmp_path / "orthoglide"
+    shutil.copytree(repository / "examples" / "orthoglide", directory)
+    right, wrong = ORTHOGLIDE_FAULTS[name]
+    code = directory / "orthoglide.py"
+    text = code.read_text()
+    assert text.count(right) == 1
+    code.write_text(text.replace(right, wrong))
+    summary = run(directory, "orthoglide", code).summary
+    assert (summary[summary["candidate"] == "exact"]["peak_error"] > 1e-10).any()
+
+
+REDUNDANT = {"bricard": (1, 4, 2), "orthoglide": (3, 13, 17)}
+
+
+@pytest.mark.parametrize("name", REDUNDANT)
+def test_redundant_rows_are_counted(repository: Path, tmp_path: Path, name: str) -> None:
+    directory = tmp_path / name
+    shutil.copytree(repository / "examples" / name, directory)
+    for case in run(directory, name, directory / f"{name}.py").manifest.cases.values():
+        assert (case.mobility, case.rank, case.redundant_rows) == REDUNDANT[name]
