@@ -12,6 +12,7 @@ from own_mechanisms import CAMPAIGN, FOURBAR
 from small_campaign import SMALL, Done, Workbench
 from workbench.campaign import user_candidates
 from workbench.errors import OutputError, SpecError
+from workbench.report.evidence import evidence_table
 
 MODEL = """
 import workbench
@@ -39,6 +40,10 @@ def test_the_reference_alone(workbench: Workbench) -> None:
     found = wb.load_run("out")
     case = found.manifest.cases["turn"]
     assert case.mobility == 1
+    assert case.kinematics == {}
+    # the platform's motion is the reference's own: held against itself it would say nothing
+    rows = {row[0].text: row[1].text for row in evidence_table(case, "turn").rows}
+    assert rows["Kinematics"] == "not compared"
     assert case.evidence.power_balance["distributed"].relative < 1e-9
     assert {row.candidate for row in found.summary.itertuples()} == {"raw mj_inverse"}
     assert found.parameters()["value"].tolist() == [0.3, 0.15, 9.81]

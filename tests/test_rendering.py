@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import own_mechanisms
 from small_campaign import SMALL, Workbench
 from workbench.errors import MissingExtraError, ModelError
 from workbench.rendering import system
@@ -53,6 +54,14 @@ def test_poses_of_a_case_are_those_of_its_motion(workbench: Workbench) -> None:
     # twin: a pose that is not on the motion leaves the loops open
     poses.qpos[0, first] += 1e-3
     assert gap(poses) > 1e-5
+
+
+def test_poses_of_a_mechanism_of_ones_own(workbench: Workbench) -> None:
+    workbench.write(own_mechanisms.FOURBAR, "fourbar.xml")
+    workbench.write(own_mechanisms.CAMPAIGN, "own.toml")
+    poses = motion_poses(Path("fourbar.xml"), Path("own.toml"), None, None, None, 0.1)
+    assert poses.qpos[:, 0] == pytest.approx(1.0 + 0.6 * np.sin(3.0 * poses.times))
+    assert gap(poses) < 1e-12
 
 
 def gap(poses: Poses) -> float:

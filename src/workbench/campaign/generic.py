@@ -1,7 +1,7 @@
 """A mechanism made of nothing but its MJCF: kinematics by the reference, parameters by name, closed forms by the user.
 
-There is no closed form here to be held against the reference, so a comparison of kinematics says nothing; the torques
-of the user's candidates are what is judged.
+There is no closed form here to be held against the reference, so kinematics are not compared; the torques of the user's
+candidates are what is judged.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ DEGREES = 4.0 * np.pi
 class GenericMechanism(Mechanism):
     """Any closed chain; a class of its own for each model, made by `generic_mechanism`."""
 
+    closed_kinematics = False
     mass_models = ("distributed",)
     parameter_table = ()
     targets = ()

@@ -107,6 +107,8 @@ class Mechanism(ABC):
     uniform_rules: ClassVar[tuple[UniformRule, ...]] = ()
     layout: ClassVar[Layout]
     """bodies, joints, loops and sites that a model must have"""
+    closed_kinematics: ClassVar[bool] = True
+    """whether the platform's motion comes from closed forms, which a reference can be compared with"""
     candidates: ClassVar[Mapping[str, Candidate]]
     parameter_type: ClassVar[type]
 

@@ -39,6 +39,9 @@ def evidence_table(record: CaseRecord, anchor: str) -> Table:
         rows.append(("Condition number", exact(record.condition, 3), record.condition, meaning))
     for level, value in record.kinematics.items():
         add(f"Kinematics: {level}", value, "", "closed form against the reference, largest error over the peak")
+    if rows and not record.kinematics:
+        meaning = "the mechanism has no closed form of its kinematics; the platform's motion is the reference's own"
+        rows.append(("Kinematics", "not compared", None, meaning))
     return Table(
         f"{anchor}-evidence",
         "Loop closure, rank and kinematics: the evidence that reference and closed form describe the same closed "
