@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -20,7 +23,6 @@ def test_what_it_writes_runs_at_once(workbench: Workbench, joints: tuple[str, ..
     options = [part for joint in joints for part in ("--actuated", joint)]
     done = workbench("new", "mine", *options, "--loops", str(len(joints)))
     assert done.code == 0, done.err
-    compile(Path("mine/test_mine.py").read_text(), "test_mine.py", "exec")
     done = workbench("run", "mine/mine.toml", "--candidates", "mine/mine.py", "--out", "out")
     assert done.code == 0, done.err
     run = wb.load_run("out")
@@ -28,6 +30,22 @@ def test_what_it_writes_runs_at_once(workbench: Workbench, joints: tuple[str, ..
     assert run.manifest.cases["first"].mobility == len(joints)
     assert run.manifest.cases["first"].evidence.power_balance["distributed"].relative < 1e-8
     assert 0 < run.summary["peak_error"].max() < 10
+
+
+def test_the_test_that_it_writes_passes_and_can_fail(workbench: Workbench) -> None:
+    assert workbench("new", "mine").code == 0
+    done = pytest_in("mine")
+    assert "1 passed" in done.stdout, done.stdout + done.stderr
+    # its bound, drawn to where a right formula belongs, does not hold for the sketch
+    test = Path("mine/test_mine.py")
+    test.write_text(test.read_text().replace("< 10.0", "< 1e-10"))
+    assert "1 failed" in pytest_in("mine").stdout
+
+
+def pytest_in(directory: str) -> subprocess.CompletedProcess[str]:
+    """Run pytest as a user would, without this repository's settings."""
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-c", os.devnull, "--rootdir", "."]
+    return subprocess.run(command, cwd=directory, capture_output=True, text=True)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +22,9 @@ MODEL = """
 import workbench
 import numpy as np
 """
+
+
+Robot: Any = SimpleNamespace(parameters=None, joints=("crank",))
 
 
 @pytest.fixture
@@ -122,6 +129,21 @@ def test_formulas_for_a_built_in_robot_get_its_parameters_and_the_force(workbenc
     )
     assert run(workbench, code, SMALL).code == 0
     assert run(workbench, code.replace("f)\n", "-f)\n").replace("qdd, -f)", "qdd, f)"), SMALL).code == 1
+
+
+def test_a_file_of_formulas_is_read_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    monkeypatch.setattr(sys, "pycache_prefix", None)
+    code = tmp_path / "mine.py"
+    text = "import workbench\n@workbench.candidate\ndef mine(p, q, qd, qdd):\n    return q + qd\n"
+    for sign, expected in (("+", 3.0), ("-", -1.0)):
+        # as long as before, and saved in the same second: a compiled file beside it would be taken for this one
+        code.write_text(text.replace("q + qd", f"q {sign} qd"))
+        os.utime(code, (1e9, 1e9))
+        (found,) = user_candidates.load_candidates([code])
+        one = np.ones((1, 1))
+        assert found(Robot, one, 2 * one, one, one) == expected
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.py"]
 
 
 COMPLAINTS = {

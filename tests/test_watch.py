@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from own_mechanisms import CAMPAIGN, FOURBAR
 from small_campaign import SMALL, Workbench, listing
 from workbench.campaign.rerun import compute_errors, files_of, stamps
 from workbench.errors import SpecError
@@ -134,6 +135,32 @@ def test_only_one_case_and_another_model(tmp_path: Path) -> None:
         watch.until("a2_left: 0.303 -> 0.3131")
 
 
+FORMULA = """import workbench
+@workbench.candidate("mine", bound=1e-10)
+def mine(p, q, qd, qdd):
+    return 1.0 * (
+        p.m1 * p.a1**2 / 3 * qdd)
+"""
+
+
+def test_a_formula_of_ones_own_is_run_again_when_it_is_saved(tmp_path: Path) -> None:
+    (tmp_path / "fourbar.xml").write_text(FOURBAR)
+    (tmp_path / "own.toml").write_text(CAMPAIGN)
+    code = tmp_path / "mine.py"
+    code.write_text(FORMULA)
+    before = listing(tmp_path)
+    with Watch(tmp_path, "own.toml", "--candidates", "mine.py") as watch:
+        first = watch.shown()
+        assert "1 beyond their bounds" in first
+        assert "mine.py" in first.splitlines()[-1]
+        save(code, FORMULA.replace("1.0 * (", "1.0 * "))
+        watch.until("mine.py:5: unmatched ')'")
+        save(code, FORMULA.replace("1.0 *", "9.0 *"))
+        shown = watch.until("1 beyond their bounds")
+        assert " x" in shown or " /" in shown
+    assert set(listing(tmp_path)) == set(before)
+
+
 @pytest.fixture
 def workbench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Workbench:
     return Workbench(tmp_path, monkeypatch, capsys)
@@ -145,6 +172,7 @@ def workbench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
         (("nowhere.toml",), "nowhere.toml: no such campaign file"),
         (("small.toml", "--set", "a2"), '--set "a2": expected NAME=VALUE'),
         (("small.toml", "--factor", "0"), "factor 0; allowed"),
+        (("small.toml", "--candidates", "absent.py"), "absent.py: no such Python file"),
         ((), "Missing argument 'CAMPAIGN'"),
     ],
 )

@@ -14,6 +14,7 @@ from workbench.campaign.compare import Row
 from workbench.campaign.evidence import Effort
 from workbench.campaign.run import compute_named_case
 from workbench.campaign.spec import CsvMotion, load_campaign
+from workbench.campaign.user_candidates import load_candidates, with_rows
 from workbench.errors import WorkbenchError
 from workbench.mjcf import find_model
 
@@ -44,6 +45,7 @@ def compute_errors(
     only: Sequence[str] = (),
     settings: Mapping[str, float] | None = None,
     relative: Sequence[str] = (),
+    candidates: Sequence[str | Path] = (),
 ) -> Errors:
     """Compute every error of a campaign as it now stands; arguments as for `workbench.campaign.run.run_campaign`.
 
@@ -54,7 +56,9 @@ def compute_errors(
     """
     clock = time.perf_counter()
     campaign, file = load_campaign(path)
-    cases = resolve_cases(campaign, file, model, tuple(only), settings, relative)
+    users = load_candidates(candidates)
+    campaign = with_rows(campaign, users)
+    cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users)
     results = [compute_named_case(campaign, case, file, QUICK) for case in cases]
     return Errors(
         rows=tuple(row for result in results for row in result.rows),
@@ -65,9 +69,9 @@ def compute_errors(
     )
 
 
-def files_of(path: str | Path, model: Path | None = None) -> tuple[Path, ...]:
-    """Files that a campaign's numbers come from: itself, its model, its motions; as far as they can be told."""
-    found = [Path(path)]
+def files_of(path: str | Path, model: Path | None = None, candidates: Sequence[str | Path] = ()) -> tuple[Path, ...]:
+    """Files that a campaign's numbers come from: itself, formulas, model, motions; as far as they can be told."""
+    found = [Path(path), *(Path(name) for name in candidates if Path(name).suffix == ".py")]
     if model is not None:
         with contextlib.suppress(WorkbenchError):
             found.append(find_model(model))

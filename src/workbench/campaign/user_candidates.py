@@ -18,9 +18,10 @@ import traceback
 from collections import ChainMap
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from importlib.machinery import SourceFileLoader
 from importlib.metadata import entry_points
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -219,10 +220,10 @@ def _module(name: str) -> ModuleType:
         )
     if path.suffix != ".py":
         raise SpecError(f"{name}: candidates stand in a Python file, its name ends in .py", file=name)
-    spec = importlib.util.spec_from_file_location(f"workbench_candidates_{path.stem}", path.resolve())
+    loader = _Uncached(f"workbench_candidates_{path.stem}", str(path.resolve()))
+    spec = importlib.util.spec_from_loader(loader.name, loader)
     assert spec is not None
-    assert spec.loader is not None
-    module, loader = importlib.util.module_from_spec(spec), spec.loader
+    module = importlib.util.module_from_spec(spec)
     # dataclasses and pickle look a function's module up by its name
     sys.modules[spec.name] = module
 
@@ -231,6 +232,14 @@ def _module(name: str) -> ModuleType:
         return module
 
     return _run(name, execute)
+
+
+class _Uncached(SourceFileLoader):
+    """Reads the source every time: a sign mended within a second leaves a file's size and second of saving alone."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Compile what the file holds now."""
+        return self.source_to_code(self.get_data(self.path), self.path)
 
 
 def _run(name: str, load: Any) -> ModuleType:

@@ -40,11 +40,15 @@ def watch(
     model: Annotated[
         Path | None, typer.Option(metavar="FILE", help="MJCF file in place of the campaign's own.")
     ] = None,
+    candidates: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE", help="Python file with formulas of your own, run at every save; may be repeated."),
+    ] = None,
     factor: Annotated[
         float, typer.Option(metavar="X", help="An error that grew by more than this factor is worse.")
     ] = 10.0,
 ) -> None:
-    """Rerun a campaign whenever its MJCF, its TOML or a motion file is saved, until Ctrl-C.
+    """Rerun a campaign whenever its MJCF, its TOML, a motion or a file of formulas is saved, until Ctrl-C.
 
     Shows every error with its change against the run before. Nothing is written; `workbench run` writes reports.
     """
@@ -52,6 +56,7 @@ def watch(
 
     from workbench.campaign.rerun import compute_errors, files_of, stamps
     from workbench.campaign.spec import load_campaign
+    from workbench.campaign.user_candidates import load_candidates
     from workbench.compare.errors import all_worse
     from workbench.console import out
     from workbench.errors import WorkbenchError
@@ -60,13 +65,17 @@ def watch(
     all_worse((), factor)
     if not campaign.exists():
         load_campaign(campaign)  # a file that never was is a mistake, not an edit
+    formulas = candidates or []
+    load_candidates(name for name in formulas if not Path(name).is_file())  # likewise; raises, or a package's own
     before: Errors | None = None
     try:
         while True:
-            files = files_of(campaign, model)
+            files = files_of(campaign, model, formulas)
             seen = stamps(files)
             try:
-                now = compute_errors(campaign, model=model, only=only or (), settings=values, relative=relative)
+                now = compute_errors(
+                    campaign, model=model, only=only or (), settings=values, relative=relative, candidates=formulas
+                )
             except WorkbenchError as error:
                 out.print(Text(f"{_time()} {error}", style="bold red"), soft_wrap=True)
             else:
