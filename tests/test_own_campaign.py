@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -71,6 +72,29 @@ def test_units_travel_with_the_frames(workbench: Workbench) -> None:
     assert found.summary.attrs["units"]["peak_reference"] == {"crank": "N m"}
     with pytest.raises(OutputError, match='no case "turm"; did you mean "turn"'):
         found.series("turm")
+
+
+THREADS = """
+import io, os, workbench as wb
+from pyarrow.parquet import read_table
+count = lambda: len(os.listdir("/proc/self/task"))
+run = wb.load_run("out")
+before = count()
+run.series("turn")
+after = count()
+read_table(io.BytesIO(open("out/series/turn.parquet", "rb").read()))
+print(after - before, count() - after)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="no way to count threads")
+def test_reading_leaves_no_threads_behind(workbench: Workbench) -> None:
+    """Threads of Arrow that hold on to a Python file abort an interpreter that ends soon after."""
+    run(workbench, None)
+    done = subprocess.run([sys.executable, "-c", THREADS], capture_output=True, text=True)
+    ours, plain = map(int, done.stdout.split())
+    assert ours == 0
+    assert plain > 0  # twin: the plain way leaves some
 
 
 FAULTS = {
