@@ -247,3 +247,22 @@ def test_entry_points_are_known_by_name(monkeypatch: pytest.MonkeyPatch) -> None
         user_candidates.load_candidates(["their-model"])
     with pytest.raises(SpecError, match='did you mean "their-model"'):
         user_candidates.load_candidates(["their-modle"])
+
+
+def test_model_check_of_an_own_mechanism_takes_what_the_campaign_says(workbench: Workbench) -> None:
+    campaign = workbench.write(CAMPAIGN)
+    alone = workbench("model", "check", "fourbar.xml")
+    assert alone.code == 1
+    assert "no actuator; a motor says which joint is actuated, or a campaign does (actuated)" in alone.out
+    done = workbench("model", "check", "fourbar.xml", "--campaign", campaign)
+    assert done.code == 0, done
+    assert "1 = 3 joint freedoms - rank 2" in done.out
+    assert "range of crank" in done.out
+    more = workbench.write(CAMPAIGN.replace('actuated = ["crank"]', 'actuated = ["crank", "elbow"]'), "more.toml")
+    redundant = workbench("model", "check", "fourbar.xml", "--campaign", more)
+    assert redundant.code == 0, redundant
+    assert "range of" not in redundant.out  # with the elbow held the crank cannot move
+    open_loop = workbench.write(FOURBAR.replace("<equality>", "<!--").replace("</equality>", "-->"), "open.xml")
+    loose = workbench("model", "check", open_loop, "--campaign", campaign)
+    assert loose.code == 1
+    assert "mobility 3, but 1 actuators" in loose.out

@@ -57,15 +57,25 @@ def set_(
 
 
 @model.command()
-def check(path: ModelFile, json: Json = False) -> None:
+def check(
+    path: ModelFile,
+    campaign: Annotated[
+        Path | None,
+        typer.Option(
+            "--campaign", metavar="FILE", help="Campaign that names the actuated joints and platform of this MJCF."
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
     """Compile, close the loops, and check every assumption of the closed form.
 
     Exit code 0: all is well; 1: an assumption is broken or the loops do not close; 2: the file cannot be read.
     """
+    from workbench.campaign.spec import load_campaign
     from workbench.commands.model_tables import print_check, print_json
     from workbench.reference.check import check_model
 
-    found = check_model(path)
+    found = check_model(path, setup=load_campaign(campaign)[0].setup if campaign else None)
     if json:
         print_json(found)
     else:

@@ -89,8 +89,9 @@ def _facts(found: ModelCheck) -> list[tuple[str, str]]:
                 f"{mobility.mobility} = {mobility.joint_freedoms} joint freedoms - rank {mobility.rank}{spin}",
             )
         )
-        formula = "; ".join(f"{name}: {value}" for name, value in found.mobility_count.items())
-        facts.append(("mobility by formula", formula or "the paper gives none"))
+        if found.mechanism:
+            formula = "; ".join(f"{name}: {value}" for name, value in found.mobility_count.items())
+            facts.append(("mobility by formula", formula or "the paper gives none"))
         facts.append(
             ("redundant rows", f"{mobility.redundant_rows} of {mobility.constraint_rows} rows of the loop closures")
         )

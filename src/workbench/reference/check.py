@@ -15,8 +15,9 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError, WorkbenchError
 from workbench.mechanisms.base import Mechanism
-from workbench.mjcf import LoadedModel, engine_warnings, open_model
+from workbench.mjcf import LoadedModel, engine_warnings, load_model, open_model
 from workbench.mjcf_assumptions import Assumption, check_assumptions
+from workbench.mjcf_setup import Setup
 from workbench.reference.closure import CLOSED, LoopCloser, constraint_jacobian
 from workbench.reference.engine import Engine
 from workbench.reference.mujoco_reference import Mobility
@@ -91,7 +92,7 @@ class ModelCheck:
         return 1 if self.broken else 0
 
 
-def check_model(path: str | Path, ranges: bool = True) -> ModelCheck:
+def check_model(path: str | Path, ranges: bool = True, setup: Setup | None = None) -> ModelCheck:
     """Check an MJCF file.
 
     Parameters
@@ -100,6 +101,8 @@ def check_model(path: str | Path, ranges: bool = True) -> ModelCheck:
         An MJCF file, or ``models/NAME.xml`` of those that come along.
     ranges
         Look for the reachable range of each active joint, which takes most of the time.
+    setup
+        What a campaign says about a file that names neither mechanism, actuators nor platform.
 
     Raises
     ------
@@ -107,7 +110,7 @@ def check_model(path: str | Path, ranges: bool = True) -> ModelCheck:
         The file cannot be read, is not safe, or does not compile. Anything else that is wrong is in the result.
     """
     with engine_warnings() as warnings:
-        loaded = open_model(path)
+        loaded = load_model(path, setup=setup) if setup else open_model(path)
         assumptions = check_assumptions(loaded)
         try:
             reached = _Closed(loaded)
@@ -126,7 +129,7 @@ def check_model(path: str | Path, ranges: bool = True) -> ModelCheck:
                 (str(error),),
             )
         problems = list(reached.problems())
-        found = reached.ranges() if ranges else ()
+        found = reached.ranges() if ranges and not reached.excess else ()
         gap = None
         if loaded.mechanism is not None and not any(not a.ok for a in assumptions) and not problems:
             gap, agreement = _agreement(reached, loaded.mechanism, found)
@@ -171,6 +174,11 @@ class _Closed:
         freedoms, idle = loops.shape[1], len(structure.idle)
         return Mobility(freedoms - rank - idle, freedoms, structure.loop_rows, rank, structure.loop_rows - rank, idle)
 
+    @property
+    def excess(self) -> int:
+        """Actuators beyond the freedoms: none of them moves with the others held."""
+        return max(0, len(self.structure.actuated) - self.mobility().mobility)
+
     def problems(self) -> list[str]:
         """What the projection could not work with."""
         found = []
@@ -179,7 +187,7 @@ class _Closed:
                 f"{self.loaded.file}: the loops stay open by {self.residual:.3g} m at home (allowed: {CLOSED:g})"
             )
         mobility, active = self.mobility().mobility, len(self.structure.actuated)
-        if mobility != active:
+        if mobility > active or (self.loaded.kind is not None and self.excess):
             found.append(f"{self.loaded.file}: mobility {mobility}, but {active} actuators; each freedom needs one")
         return found
 

@@ -78,7 +78,9 @@ def read_structure(model: mujoco.MjModel, file: str) -> Structure:
     obj = mujoco.mjtObj
     joints = [int(model.actuator_trnid[a, 0]) for a in range(model.nu)]
     if not joints:
-        raise ModelError(f"{file}: no actuator; the actuated joints are those that a motor drives", file=file)
+        raise ModelError(
+            f"{file}: no actuator; a motor says which joint is actuated, or a campaign does (actuated)", file=file
+        )
     actuated = np.array([model.jnt_dofadr[j] for j in joints], dtype=np.int64)
     moves = np.zeros((model.nbody, model.nv), dtype=np.bool_)
     for body in range(1, model.nbody):
