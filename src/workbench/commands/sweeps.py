@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -117,9 +117,10 @@ def run_and_print(
     command: list[str],
     effort: Effort,
     options: SweepOptions,
+    report: Callable[[Path], object],
     candidates: Sequence[str | Path] = (),
 ) -> bool:
-    """Run a sweep and print its outcome; return whether every case passed."""
+    """Run a sweep, write its report and print its outcome; return whether every case passed."""
     check_engines(effort.engines)
     with SweepProgress() as progress:
         outcome = run_sweep(
@@ -133,6 +134,7 @@ def run_and_print(
             effort=effort,
             options=options,
             candidates=candidates,
+            report=report,
         )
     print_sweep(outcome)
     return outcome.passed
@@ -160,7 +162,7 @@ def print_sweep(outcome: SweepOutcome) -> None:
     counts = ", ".join(f"{n} {status}" for status, n in summary["counts"].items() if n)
     verdict = "PASSED" if outcome.passed else "FAILED"
     out.print(Text(f"{verdict}: {counts}, of {summary['cases']} cases.", style="green" if outcome.passed else "red"))
-    out.print(Text(f"Written to {outcome.directory}: sweep.json, cases, summary"), soft_wrap=True)
+    out.print(Text(f"Report: {outcome.directory / 'report.html'}; data: sweep.json, cases, summary"), soft_wrap=True)
 
 
 def _percent(value: float) -> str:

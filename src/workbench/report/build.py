@@ -17,12 +17,14 @@ from markupsafe import Markup, escape
 from workbench.errors import OutputError
 from workbench.report.cost import cost_table
 from workbench.report.latex import latex_table
-from workbench.report.load import Run, load_run
+from workbench.report.load import Run, load_run, read_manifest
 from workbench.report.pdf import all_tables, figure_pdf, report_pdf
 from workbench.report.section import Section
 from workbench.report.sections import build_sections
 from workbench.report.style import STYLES, figure_style
 from workbench.report.svg import StyleSheet, inline, standalone
+from workbench.report.sweep.load import SweepRun, load_sweep
+from workbench.report.sweep.sections import sweep_sections
 from workbench.report.text import fenced, finalize_markdown
 from workbench.report.verdict_section import circumstances
 
@@ -42,7 +44,7 @@ def build_report(run_dir: Path, formats: Sequence[str] = ("html", "md"), style: 
     Parameters
     ----------
     run_dir
-        A run directory with manifest.json, summary.csv and series/. Nothing is recomputed.
+        A run directory with manifest.json, summary.csv and series/, or that of a finished sweep. Nothing is recomputed.
     formats
         ``html``: report.html, one file that loads nothing from elsewhere; ``md``: report.md and the SVG figures that it
         shows; ``pdf``: report.pdf, each figure as a PDF, and each table as LaTeX in tables/.
@@ -63,8 +65,14 @@ def build_report(run_dir: Path, formats: Sequence[str] = ("html", "md"), style: 
     _check_choice("format", formats, FORMATS)
     _check_choice("style", [style], STYLES)
     run_dir = Path(run_dir)
-    run = load_run(run_dir)
-    sections = build_sections(run)
+    manifest = read_manifest(run_dir)
+    run: Run | SweepRun
+    if manifest.sweep is None:
+        run = load_run(run_dir)
+        sections = build_sections(run)
+    else:
+        run = load_sweep(run_dir, manifest)
+        sections = sweep_sections(run)
     with figure_style(style), _few_collections():
         files = _rendered(run, sections, formats)
     try:
@@ -88,7 +96,7 @@ def _check_choice(what: str, given: Sequence[str], allowed: Iterable[str]) -> No
             raise OutputError(f"report: unknown {what} {name!r}; allowed: {', '.join(allowed)}")
 
 
-def _rendered(run: Run, sections: list[Section], formats: Sequence[str]) -> dict[Path, bytes]:
+def _rendered(run: Run | SweepRun, sections: list[Section], formats: Sequence[str]) -> dict[Path, bytes]:
     files: dict[Path, bytes] = {}
     figures = run.directory / FIGURES
     for number, plot in enumerate(plot for section in sections for plot in section.plots):
@@ -106,13 +114,13 @@ def _rendered(run: Run, sections: list[Section], formats: Sequence[str]) -> dict
         files[run.directory / "report.html"] = render_html(run, sections).encode()
     if "pdf" in formats:
         files[run.directory / "report.pdf"] = report_pdf(run, sections)
-        costs = cost_table(run)
+        costs = cost_table(run.manifest)
         for table in (*all_tables(sections), *([costs] if costs else [])):
             files[run.directory / TABLES / f"{table.key}.tex"] = latex_table(table).encode()
     return files
 
 
-def render_html(run: Run, sections: list[Section]) -> str:
+def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
     """Return the whole page."""
     environment = _environment()
     sheet = StyleSheet()
@@ -127,8 +135,8 @@ def render_html(run: Run, sections: list[Section]) -> str:
     page = environment.get_template("report.html.j2")
     text = page.render(
         manifest=run.manifest,
-        circumstances=circumstances(run),
-        costs=cost_table(run),
+        circumstances=circumstances(run.manifest),
+        costs=cost_table(run.manifest),
         sections=bodies,
         style=Markup(style + sheet.rules),
         script=Markup(script),
@@ -149,7 +157,7 @@ def _without_blank_lines(text: str) -> str:
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip()) + "\n"
 
 
-def render_markdown(run: Run, sections: list[Section]) -> str:
+def render_markdown(run: Run | SweepRun, sections: list[Section]) -> str:
     """Return the report as Markdown that shows figures/*.svg."""
     environment = _environment()
     environment.finalize = finalize_markdown
@@ -161,7 +169,7 @@ def render_markdown(run: Run, sections: list[Section]) -> str:
         for section in sections
     ]
     text = environment.get_template("report.md.j2").render(
-        manifest=run.manifest, circumstances=circumstances(run), costs=cost_table(run), sections=bodies
+        manifest=run.manifest, circumstances=circumstances(run.manifest), costs=cost_table(run.manifest), sections=bodies
     )
     return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from workbench.report.load import Run
+from workbench.report.manifest import Manifest
 from workbench.report.tables import Cell, Table, columns
 from workbench.report.text import exact
 
 
-def cost_table(run: Run) -> Table | None:
+def cost_table(manifest: Manifest) -> Table | None:
     """Computing cost of each candidate, microseconds per sample, and its authors' where they printed one."""
-    candidates = run.manifest.candidates
+    candidates = manifest.candidates
     measured = {name: record for name, record in candidates.items() if record.cost_us is not None}
     if not measured:
         return None

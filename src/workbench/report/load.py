@@ -20,6 +20,9 @@ from workbench.arrays import FloatArray
 from workbench.errors import OutputError
 from workbench.report.manifest import FORMAT_VERSION, Manifest
 
+UNFINISHED = "journal.jsonl"
+"""Holds the cases of a sweep while it runs, or after it was stopped."""
+
 Series = Mapping[str, FloatArray]
 """Column name -> values, shape ``(n,)``, SI."""
 
@@ -89,7 +92,7 @@ class Run:
         except FileNotFoundError as error:
             raise OutputError(f"{path}: missing, though manifest.json lists case {case!r} as computed") from error
         except (OSError, ValueError, pyarrow.ArrowException) as error:
-            raise OutputError(f"{path}: not a readable Parquet file ({_short(error)})") from error
+            raise OutputError(f"{path}: not a readable Parquet file ({short(error)})") from error
         self._check_columns(path, columns)
         return columns
 
@@ -112,7 +115,12 @@ def load_run(directory: Path) -> Run:
     OutputError
         One line that names the file, the key or line, the value and what is allowed.
     """
-    manifest = _read_manifest(directory / "manifest.json")
+    manifest = read_manifest(directory)
+    if manifest.sweep is not None:
+        raise OutputError(
+            f"{directory}: holds a sweep of {manifest.sweep.cases} cases, where this needs a run without one; "
+            "its data sets cases/ and summary/ read with pandas.read_parquet"
+        )
     rows = _read_summary(directory / "summary.csv")
     for number, row in enumerate(rows, start=2):
         for what, value, valid in (
@@ -128,21 +136,42 @@ def load_run(directory: Path) -> Run:
     return Run(directory, manifest, rows)
 
 
-def _read_text(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """Read a file of a run directory.
+
+    Raises
+    ------
+    OutputError
+        It is missing or cannot be read.
+    """
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
-        raise OutputError(f"{path}: missing; a run directory holds manifest.json and summary.csv") from error
+        held = "a run directory holds manifest.json and summary.csv, or sweep.json in place of it"
+        raise OutputError(f"{path}: missing; {held}") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise OutputError(f"{path}: cannot be read ({_short(error)})") from error
+        raise OutputError(f"{path}: cannot be read ({short(error)})") from error
 
 
-def _read_manifest(path: Path) -> Manifest:
-    text = _read_text(path)
+def read_manifest(directory: Path) -> Manifest:
+    """Read manifest.json of a run directory, with a sweep or without.
+
+    Raises
+    ------
+    OutputError
+        One line that names the file, the key and the value; or says that a sweep is not finished.
+    """
+    path = directory / "manifest.json"
+    if not path.exists() and (directory / UNFINISHED).exists():
+        raise OutputError(
+            f"{directory}: holds a sweep that is not finished; the same workbench run command goes on with it, and "
+            "writes the report at the end"
+        )
+    text = read_text(path)
     try:
         data = json.loads(text)
     except ValueError as error:
-        raise OutputError(f"{path}: not valid JSON ({_short(error)})") from error
+        raise OutputError(f"{path}: not valid JSON ({short(error)})") from error
     version = data.get("format") if isinstance(data, dict) else None
     if version != FORMAT_VERSION:
         raise OutputError(f"{path}: format {version!r} is not supported; allowed: {FORMAT_VERSION}", key="format")
@@ -168,7 +197,7 @@ REQUIRED_COLUMNS = (
 
 def _read_summary(path: Path) -> tuple[ErrorRow, ...]:
     # The csv module and not pandas: a case may be called "nan" or "1e5" and must stay text.
-    reader = csv.DictReader(io.StringIO(_read_text(path), newline=""))
+    reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
     header = reader.fieldnames or []
     for column in REQUIRED_COLUMNS:
         if column not in header:
@@ -210,5 +239,6 @@ def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
     )
 
 
-def _short(error: BaseException) -> str:
+def short(error: BaseException) -> str:
+    """Return an error's message as one short line."""
     return " ".join(str(error).split())[:160] or type(error).__name__

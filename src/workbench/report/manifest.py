@@ -215,6 +215,13 @@ class CaseRecord(Record):
     warnings: tuple[str, ...] = ()
 
 
+class SweepRecord(Record):
+    """That the run is a sweep: then its cases stand in data sets and not here."""
+
+    cases: int
+    counts: dict[str, int] = {}
+
+
 class Manifest(Record):
     """manifest.json."""
 
@@ -246,6 +253,7 @@ class Manifest(Record):
     claims: tuple[ClaimRecord, ...] = ()
     figures: tuple[FigureRecord, ...] = ()
     cases: dict[str, CaseRecord]
+    sweep: SweepRecord | None = None
 
     def unit_of(self, joint: str) -> str:
         """Unit of the force or torque of *joint*."""

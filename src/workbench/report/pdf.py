@@ -18,6 +18,7 @@ from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.style import GRID, INK
 from workbench.report.svg import new_figure
+from workbench.report.sweep.load import SweepRun
 from workbench.report.tables import Cell, Table
 from workbench.report.verdict_section import circumstances
 
@@ -158,7 +159,7 @@ class Pages:
         )
 
 
-def report_pdf(run: Run, sections: Sequence[Section]) -> bytes:
+def report_pdf(run: Run | SweepRun, sections: Sequence[Section]) -> bytes:
     """Return the whole report as PDF; the same results give the same bytes."""
     manifest = run.manifest
     title = manifest.title or manifest.campaign
@@ -171,8 +172,8 @@ def report_pdf(run: Run, sections: Sequence[Section]) -> bytes:
             pages.lines(f"Error report of the campaign {manifest.campaign}", SMALL_PRINT, after=0.02)
             pages.lines(title, 15.0, bold=True)
             pages.lines(manifest.description, BODY, after=0.1)
-            pages.lines(" ".join(circumstances(run)), SMALL_PRINT, after=0.2)
-            if costs := cost_table(run):
+            pages.lines(" ".join(circumstances(manifest)), SMALL_PRINT, after=0.2)
+            if costs := cost_table(manifest):
                 pages.table(costs)
             for section in sections:
                 _set_section(pages, section)
@@ -205,6 +206,8 @@ def _set_section(pages: Pages, section: Section) -> None:
     if "sentence" in context:
         status = context["status"]
         pages.lines(f"{status.symbol} {status.text}: {context['sentence']}", BODY + 1, bold=True, after=0.2)
+    for text in context.get("paragraphs", ()):
+        pages.lines(text, BODY, after=0.15)
     if context.get("command"):
         pages.lines(context["command"], BODY, after=0.15)
     for table in context.get("tables", ()):

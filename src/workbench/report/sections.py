@@ -13,7 +13,7 @@ from workbench.report.campaign_figures import campaign_plot, error_over_plot
 from workbench.report.case_section import CaseView, case_view
 from workbench.report.error_sections import claims_section, worst_section
 from workbench.report.load import Run, Series
-from workbench.report.manifest import FigureRecord
+from workbench.report.manifest import FigureRecord, Manifest
 from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.tables import CASE_STATUS, CHECKED, NOT_COMPUTED, Cell, Table, columns
@@ -65,8 +65,8 @@ def build_sections(run: Run) -> list[Section]:
         budget_section(run, anchors),
         cases_section(run, views),
         figures_section(run, drawn, anchors),
-        parameters_section(run),
-        reproduce_section(run),
+        parameters_section(run.manifest),
+        reproduce_section(run.manifest),
         limits_section(run),
     ]
     return [section for section in sections if section is not None]
@@ -133,7 +133,7 @@ def figures_section(run: Run, drawn: Mapping[int, Plot | str], anchors: Mapping[
     return Section("figures", "Figures of the papers, redrawn", "figures", {"views": views}, plots)
 
 
-def parameters_section(run: Run) -> Section:
+def parameters_section(manifest: Manifest) -> Section:
     """List the model's parameters with units and sources."""
     rows = tuple(
         (
@@ -143,7 +143,7 @@ def parameters_section(run: Run) -> Section:
             Cell(parameter.meaning),
             Cell(parameter.source),
         )
-        for parameter in run.manifest.parameters
+        for parameter in manifest.parameters
     )
     table = Table(
         "parameters",
@@ -157,16 +157,15 @@ def parameters_section(run: Run) -> Section:
         "mobility",
         "The mechanism's freedoms as counted on paper; the numerical count stands with each case.",
         columns(("Quantity", "Number"), numeric=("Number",)),
-        tuple((Cell(name), Cell(str(value), value)) for name, value in run.manifest.mobility_count.items()),
+        tuple((Cell(name), Cell(str(value), value)) for name, value in manifest.mobility_count.items()),
         "Counted by the formula of the mechanism's source; it agrees when the mobility equals each case's.",
     )
     tables = [table for table in (table, counted) if table.rows]
     return Section("parameters", "Parameters", "tables", {"tables": tables})
 
 
-def reproduce_section(run: Run) -> Section:
+def reproduce_section(manifest: Manifest) -> Section:
     """Say how to get the same numbers again."""
-    manifest = run.manifest
     rows = [
         ("Campaign", manifest.spec_file or manifest.campaign),
         ("Model", manifest.model.file),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from urllib.parse import quote
 
 
 @dataclass(frozen=True)
@@ -36,9 +37,9 @@ CASE_STATUS = {
     "error": ERROR,
     "undecided": UNDECIDED_VERDICT,
     "invalid": Status("invalid", "⊘", "invalid, not computed"),
-    "timeout": Status("timeout", "⏱", "TIMED OUT", loud=True),
-    "killed": Status("timeout", "☠", "KILLED", loud=True),
-    "filtered": Status("measured", "", "filtered out"),
+    "timeout": Status("timeout", "◷", "TIMED OUT", loud=True),
+    "killed": Status("killed", "☠", "KILLED", loud=True),
+    "filtered": Status("filtered", "", "filtered out"),
 }
 NOT_COMPUTED = frozenset({"error", "invalid", "timeout", "killed", "filtered"})
 """Statuses of cases that have no series."""
@@ -82,6 +83,13 @@ class Cell:
     status: Status | None = None
     link: str | None = None
     emphasis: bool = False
+    file: str = ""
+    """path of a file of the run directory, relative to it, that the text leads to"""
+
+    @property
+    def href(self) -> str:
+        """Where the text leads to, as a relative address; empty where it leads nowhere."""
+        return quote(self.file) if self.file else f"#{self.link}" if self.link else ""
 
 
 @dataclass(frozen=True)

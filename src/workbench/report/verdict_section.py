@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from workbench.report.load import Run
+from workbench.report.manifest import Manifest
 from workbench.report.section import Section
 from workbench.report.tables import (
     CHECKED,
@@ -26,23 +27,35 @@ def verdict_section(run: Run) -> Section:
     sentence = sentence[:1].upper() + sentence[1:]
     contrasts = {row.candidate for row in run.rows if row.kind == "contrast"}
     tested = sum(name not in contrasts for name in run.manifest.candidates)
-    table = Table(
+    table = candidates_table(run.manifest)
+    cases = _cases(len(run.manifest.cases))
+    about = f"{model_text(run.manifest)}, {cases}, {tested} candidate{'s' if tested != 1 else ''}."
+    context = {"status": status, "sentence": sentence, "about": about, "tables": [table]}
+    return Section("verdict", "Verdict", "verdict", context)
+
+
+def candidates_table(manifest: Manifest) -> Table:
+    """List the formulas that a campaign puts to the test."""
+    return Table(
         "candidates",
         "The candidates: the formulas that this campaign puts to the test.",
         columns(("Candidate", "Mass model", "What it is", "Source")),
         tuple(
             (Cell(name), Cell(candidate.mass_model), Cell(candidate.description), Cell(candidate.source))
-            for name, candidate in run.manifest.candidates.items()
+            for name, candidate in manifest.candidates.items()
         ),
         "The mass model is the assumption about the bars' masses that a formula shares with its reference.",
     )
-    context = {"status": status, "sentence": sentence, "manifest": run.manifest, "tables": [table], "tested": tested}
-    return Section("verdict", "Verdict", "verdict", context)
 
 
-def circumstances(run: Run) -> tuple[str, ...]:
+def model_text(manifest: Manifest) -> str:
+    """Name the mechanism, its paper and the model's file."""
+    key = f" [{manifest.model.reference_key}]" if manifest.model.reference_key else ""
+    return f"{manifest.model.title or manifest.model.mechanism}{key}, model {manifest.model.file}"
+
+
+def circumstances(manifest: Manifest) -> tuple[str, ...]:
     """Say when and where the run was made: with what its formulas cost there, all that differs from run to run."""
-    manifest = run.manifest
     machine = ", ".join(f"{key} {value}" for key, value in manifest.machine.items())
     seconds = "" if manifest.seconds is None else f", in {manifest.seconds:.1f} s"
     told = [

@@ -1,0 +1,56 @@
+"""The sections of a sweep's report, in reading order."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from workbench.report.section import Section
+from workbench.report.sections import parameters_section, reproduce_section
+from workbench.report.sweep.cases import trouble_section, worst_section
+from workbench.report.sweep.drivers import drivers_section
+from workbench.report.sweep.errors import errors_section
+from workbench.report.sweep.heat import heat_section
+from workbench.report.sweep.load import SweepRun
+from workbench.report.sweep.varied import varied_section
+from workbench.report.sweep.verdict import GOOD, number, verdict_section
+
+
+def sweep_sections(run: SweepRun) -> list[Section]:
+    """Return all sections of a sweep's report; figures are drawn when they are asked for."""
+    sections = [
+        verdict_section(run),
+        varied_section(run),
+        errors_section(run),
+        drivers_section(run),
+        heat_section(run),
+        worst_section(run),
+        trouble_section(run),
+        parameters_section(run.manifest),
+        reproduce_section(run.manifest),
+        _limits_section(run),
+    ]
+    return [section for section in sections if section is not None]
+
+
+def _limits_section(run: SweepRun) -> Section:
+    known = max((int(np.isfinite(errors).sum()) for errors in run.worst.values()), default=0)
+    lost = sum(count for name, count in run.summary.counts.items() if name not in GOOD)
+    points = [
+        "This verifies formulas against a simulator. It does not validate either against a real robot: friction, "
+        "clearance, elasticity and everything else that the model leaves out is left out on both sides.",
+        "Shares and quantiles are of these designs: they say how the error is spread over the ranges that the campaign "
+        "chose, with the weight that it gave them, and not how likely a design is.",
+        "Every design follows the case's motion, made faster or slower where the campaign says so. On another path the "
+        "error of a model is another one.",
+        "A rank correlation sees what rises or falls throughout; an error that is largest in the middle of a range can "
+        "have a correlation of nought. The maps show such courses.",
+        "The largest error of a design is the largest at its samples, and the largest over the designs is a lower "
+        "limit of what the ranges hold: more designs find larger ones.",
+    ]
+    if known < run.summary.cases:
+        also = f", or did not pass ({number(lost)})" if lost else ""
+        points.append(
+            f"{number(run.summary.cases - known)} of {number(run.summary.cases)} cases have no error: they were left "
+            f"out{also}. What is said of the others does not hold for them."
+        )
+    return Section("limits", "Limits and caveats", "limits", {"points": points})
