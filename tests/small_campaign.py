@@ -93,6 +93,7 @@ class Workbench:
         self._captured = capsys
         monkeypatch.chdir(directory)
         monkeypatch.setattr("workbench.report.build_report", lambda directory: None)
+        monkeypatch.setattr("workbench.commands.sweeps.report_apart", lambda directory: None)
 
     def write(self, text: str, name: str = "small.toml") -> str:
         """Write a file and return its name."""

@@ -71,7 +71,7 @@ def run(
     from workbench.campaign.spec import load_campaign
     from workbench.campaign.sweep.run import SweepInterrupted, SweepOptions
     from workbench.commands.sweeps import dry_run as print_dry_run
-    from workbench.commands.sweeps import run_and_print
+    from workbench.commands.sweeps import report_apart, run_and_print
     from workbench.console import CaseProgress, print_outcome
 
     values, relative = settings(set_ or [])
@@ -97,12 +97,13 @@ def run(
                 effort=effort,
                 options=SweepOptions(jobs, scheduler, fresh, retry_failed),
                 candidates=candidates or (),
+                report=report_apart,
             )
         except SweepInterrupted as stop:
             typer.echo(f"workbench: {stop}", err=True)
             raise
     else:
-        from workbench.report import build_report  # brings matplotlib, which no sweep needs
+        from workbench.report import build_report
 
         with CaseProgress() as progress:
             outcome = run_campaign(

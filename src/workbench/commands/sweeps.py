@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -19,6 +21,7 @@ from workbench.campaign.sweep.estimate import estimate
 from workbench.campaign.sweep.progress import Snapshot
 from workbench.campaign.sweep.run import SweepOptions, SweepOutcome, run_sweep
 from workbench.console import err, out
+from workbench.errors import OutputError
 
 LINE_EVERY_S = 10.0
 """Seconds between lines of progress where there is no terminal."""
@@ -138,6 +141,22 @@ def run_and_print(
         )
     print_sweep(outcome)
     return outcome.passed
+
+
+def report_apart(directory: Path) -> None:
+    """Write a sweep's report in a process of its own: what drawing takes does not add to what the run holds.
+
+    Raises
+    ------
+    OutputError
+        The report cannot be written; the results stand.
+    """
+    # no current directory and no user's modules before the package's own, as in the command itself
+    command = [sys.executable, "-P", "-m", "workbench.cli", "report", "--", str(directory)]
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    if done.returncode:
+        said = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+        raise OutputError(said.removeprefix("workbench: "), path=str(directory))
 
 
 def print_sweep(outcome: SweepOutcome) -> None:
