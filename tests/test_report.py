@@ -813,7 +813,7 @@ def test_computing_cost_stands_beside_what_was_printed(tmp_path: Path) -> None:
         first |= {"cost_us": 0.5, "printed_cost": {"us": 703.0, "source": "Scilab"}}
         second |= {"cost_us": 0.25}
 
-    table = cost_table(load_run(make_run(tmp_path / "run", cases=1, samples=20, edit=edit)))
+    table = cost_table(load_run(make_run(tmp_path / "run", cases=1, samples=20, edit=edit)).manifest)
     assert table is not None
     assert [cell.text for cell in table.rows[0][2:]] == ["0.5", "703", "1,400", "Scilab"]
     assert [cell.value for cell in table.rows[0][2:]] == [0.5, 703.0, 1406.0, None]
@@ -823,4 +823,4 @@ def test_computing_cost_stands_beside_what_was_printed(tmp_path: Path) -> None:
         for record in manifest["candidates"].values():
             del record["cost_us"]
 
-    assert cost_table(load_run(make_run(tmp_path / "other", cases=1, samples=20, edit=unmeasured))) is None
+    assert cost_table(load_run(make_run(tmp_path / "other", cases=1, samples=20, edit=unmeasured)).manifest) is None

@@ -169,7 +169,10 @@ def render_markdown(run: Run | SweepRun, sections: list[Section]) -> str:
         for section in sections
     ]
     text = environment.get_template("report.md.j2").render(
-        manifest=run.manifest, circumstances=circumstances(run.manifest), costs=cost_table(run.manifest), sections=bodies
+        manifest=run.manifest,
+        circumstances=circumstances(run.manifest),
+        costs=cost_table(run.manifest),
+        sections=bodies,
     )
     return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"
 
