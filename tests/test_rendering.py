@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
+import json
 import os
 import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,10 +21,11 @@ import pytest
 import own_mechanisms
 from small_campaign import SMALL, Workbench
 from workbench.errors import MissingExtraError, ModelError
-from workbench.rendering import system
+from workbench.rendering import run_pictures, system
 from workbench.rendering.poses import Poses, home_pose, motion_poses
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
+DRAWS = run_pictures.RunPictures
 ASYM, PLANAR = MODELS / "asym_2rss_ppap.xml", MODELS / "planar_4rprp.xml"
 
 
@@ -267,3 +272,79 @@ def test_the_viewer_on_a_virtual_screen(tmp_path: Path) -> None:
     finally:
         screen.terminate()
         screen.wait()
+
+
+# --- the pictures of a run ---
+
+
+@pytest.fixture
+def drawing(workbench: Workbench, monkeypatch: pytest.MonkeyPatch) -> Workbench:
+    monkeypatch.setattr(run_pictures, "RunPictures", DRAWS)
+    return workbench
+
+
+def record_of(workbench: Workbench, name: str) -> dict[str, Any]:
+    text = (workbench.directory / name / "pictures" / "pictures.json").read_text(encoding="utf-8")
+    loaded: dict[str, Any] = json.loads(text)
+    return loaded
+
+
+@draws
+def test_a_run_keeps_a_still_and_a_film_of_its_first_case(drawing: Workbench, monkeypatch: pytest.MonkeyPatch) -> None:
+    from PIL import Image
+
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    assert drawing.run(SMALL, "--quick", "--out", "run").code == 0
+    record = record_of(drawing, "run")
+    assert (record["case"], record["note"]) == ("first", "")
+    assert record["times"] == pytest.approx(np.linspace(0, 1, 21))
+    place = drawing.directory / "run" / "pictures"
+    width, height = record["width"], record["height"]
+    with Image.open(place / "mechanism.webp") as still, Image.open(place / "film.webp") as film:
+        assert still.size == (2 * width, 2 * height)
+        sheet = np.asarray(film.convert("RGB")).astype(int)
+    assert sheet.shape == (4 * height, 6 * width, 3)
+    frames = [sheet[k // 6 * height :, k % 6 * width :][:height, :width] for k in range(21)]
+    assert all(np.ptp(frame) > 100 for frame in frames)
+    moved = [np.abs(one - other).max() for one, other in itertools.pairwise(frames)]
+    assert min(moved) > 50
+    assert np.abs(frames[0] - frames[0]).max() == 0
+    again = drawing.run(SMALL, "--quick", "--out", "run")  # pictures are part of a run directory
+    assert again.code == 0
+    assert drawing.run(SMALL, "--quick", "--no-pictures", "--out", "run").code == 0
+    assert not place.exists()
+
+
+@pytest.mark.parametrize(
+    ("backend", "said"), [("nonsense", "no offscreen OpenGL on this machine (tried nonsense)"), (None, "needs")]
+)
+def test_a_machine_that_cannot_draw_says_so_and_fails_no_run(
+    drawing: Workbench, monkeypatch: pytest.MonkeyPatch, backend: str | None, said: str
+) -> None:
+    if backend:
+        monkeypatch.setattr(run_pictures, "needs", lambda *modules: None)
+        monkeypatch.setenv("MUJOCO_GL", backend)
+    else:
+        monkeypatch.setattr(system.importlib.util, "find_spec", lambda name: None)
+    done = drawing.run(SMALL, "--quick", "--out", "run")
+    assert (done.code, done.complaint) == (0, [])
+    assert said in record_of(drawing, "run")["note"]
+    assert [path.name for path in (drawing.directory / "run" / "pictures").iterdir()] == ["pictures.json"]
+
+
+def test_a_drawing_that_hangs_is_left_behind(drawing: Workbench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run_pictures, "needs", lambda *modules: None)
+    monkeypatch.setattr(run_pictures, "PATIENCE_S", 0.2)
+    started: list[subprocess.Popen[bytes]] = []
+
+    def hang(command: list[str], **options: Any) -> subprocess.Popen[bytes]:
+        started.append(subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"]))
+        return started[-1]
+
+    monkeypatch.setattr(run_pictures, "popen", hang)
+    before = set(Path(tempfile.gettempdir()).glob("workbench_*"))
+    done = drawing.run(SMALL, "--quick", "--out", "run")
+    assert (done.code, done.complaint) == (0, [])
+    assert record_of(drawing, "run")["note"] == "drawing took longer than 0.2 s"
+    assert [process.wait(20) for process in started] == [-signal.SIGKILL]
+    assert set(Path(tempfile.gettempdir()).glob("workbench_*")) <= before

@@ -75,6 +75,10 @@ class CaseResult:
     facts: dict[str, Any] = field(repr=False)
     faults: Sequence[Fault] = ()
     """what the user's candidates did wrong"""
+    model_text: str = field(default="", repr=False)
+    """MJCF of the reference, the case's parameters written into it"""
+    qpos: FloatArray | None = field(default=None, repr=False)
+    """``(n, nq)`` its poses, MuJoCo's own coordinates; with drawings only"""
 
 
 def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseResult:
@@ -124,7 +128,9 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for point, place in drawing.points.items():
             series |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
-    return CaseResult(case.name, rows, series, computed.noted(facts), tuple(computed.faults.values()))
+    poses = first.qpos if effort.drawing else None
+    faults = tuple(computed.faults.values())
+    return CaseResult(case.name, rows, series, computed.noted(facts), faults, reference.text, poses)
 
 
 def _refuse_other_branch(case: Case, x: FloatArray) -> None:

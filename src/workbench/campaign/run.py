@@ -5,10 +5,11 @@ from __future__ import annotations
 import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from workbench.campaign import store
 from workbench.campaign.cases import Case, resolve_cases, with_unit_hint
@@ -35,6 +36,19 @@ class Outcome:
     manifest: dict[str, Any]
 
 
+class Pictures(Protocol):
+    """What draws the robot while a run computes; it never fails a run."""
+
+    def start(self, result: CaseResult) -> None:
+        """Begin with a case that has just been computed."""
+
+    def finish(self, stage: Path) -> None:
+        """Put what there is into a run directory that has its manifest."""
+
+    def close(self) -> None:
+        """End what was begun."""
+
+
 Progress = Callable[[str, int, int], None]
 """Called with a case's name, its number from 0, and the number of cases; at the end with an empty name."""
 
@@ -50,6 +64,7 @@ def run_campaign(
     command: Sequence[str] = (),
     progress: Progress | None = None,
     report: Callable[[Path], object] | None = None,
+    pictures: Pictures | None = None,
     effort: Effort = FULL,
     candidates: Sequence[str | Path] = (),
 ) -> Outcome:
@@ -75,6 +90,8 @@ def run_campaign(
         Called before each case.
     report
         Called with the directory when the results stand in it, before it is moved to its place.
+    pictures
+        Draws the robot of the first case while the others are computed.
     effort
         How much evidence is gathered beside the errors, and with which engines.
     candidates
@@ -98,12 +115,14 @@ def run_campaign(
     check_engines(effort.engines)
     cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users)
     results: list[CaseResult] = []
-    with locked(directory), staged(directory) as stage:
+    with locked(directory), staged(directory) as stage, closing(pictures) if pictures else nullcontext():
         for number, case in enumerate(cases):
             if progress:
                 progress(case.name, number, len(cases))
             results.append(compute_named_case(campaign, case, file, effort))
             store.write_series(stage, case.name, results[-1].series)
+            if pictures and number == 0:
+                pictures.start(results[0])
         if progress:
             progress("", len(cases), len(cases))
         rows = [row for result in results for row in result.rows]
@@ -120,6 +139,8 @@ def run_campaign(
         }
         store.write_summary(stage, rows)
         store.write_manifest(stage, manifest)
+        if pictures:
+            pictures.finish(stage)
         if report:
             report(stage)
     return Outcome(directory, passed, rows, manifest)

@@ -22,12 +22,13 @@ FORMAT = 1
 MANIFEST = "manifest.json"
 SUMMARY = "summary.csv"
 SERIES = "series"
+PICTURES = "pictures"
 REPORTS = ("report.html", "report.md", "report.pdf", "figures", "tables")
 RUN = DirectoryKind(
     what="run",
     marker=MANIFEST,
     keys=frozenset({"format", "campaign", "cases"}),
-    members=(MANIFEST, SUMMARY, SERIES, *REPORTS),
+    members=(MANIFEST, SUMMARY, SERIES, PICTURES, *REPORTS),
 )
 
 

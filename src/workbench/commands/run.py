@@ -45,6 +45,9 @@ def run(
     quick: Annotated[
         bool, typer.Option("--quick", help="Errors only: no power balance, no forward replay, no raw mj_inverse.")
     ] = False,
+    pictures: Annotated[
+        bool, typer.Option(help="Draw the robot for the report, where this machine can; a sweep has no pictures.")
+    ] = True,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check everything; print cases, samples, time and disk; write nothing.")
     ] = False,
@@ -103,6 +106,7 @@ def run(
             typer.echo(f"workbench: {stop}", err=True)
             raise
     else:
+        from workbench.rendering.run_pictures import RunPictures
         from workbench.report import build_report
 
         with CaseProgress() as progress:
@@ -116,6 +120,7 @@ def run(
                 command=command,
                 progress=progress,
                 report=build_report,
+                pictures=RunPictures() if pictures else None,
                 effort=effort,
                 candidates=candidates or (),
             )

@@ -50,6 +50,12 @@ def needs(*modules: str) -> None:
         raise MissingExtraError(f"drawing needs {' and '.join(missing)}; install: {EXTRA}", modules=missing)
 
 
+def backends() -> tuple[str, ...]:
+    """Return the values of MUJOCO_GL to try on this system, best first; one that is set already counts alone."""
+    chosen = os.environ.get("MUJOCO_GL")
+    return (chosen,) if chosen else OFFSCREEN.get(sys.platform, ("glfw",))
+
+
 @cache
 def offscreen_backend() -> str:
     """Return the value of MUJOCO_GL that draws offscreen on this machine; one that is set already counts alone.
@@ -60,16 +66,16 @@ def offscreen_backend() -> str:
         None does; the message says what to install.
     """
     needs("OpenGL", "glfw")
-    chosen = os.environ.get("MUJOCO_GL")
-    backends = (chosen,) if chosen else OFFSCREEN.get(sys.platform, ("glfw",))
-    for backend in backends:
+    tried = backends()
+    for backend in tried:
         if _draws(PICTURE, {"MUJOCO_GL": backend}):
             return backend
-    said = f"MUJOCO_GL={chosen} does not draw" if chosen else f"none of {', '.join(backends)} draws"
+    chosen = os.environ.get("MUJOCO_GL")
+    said = f"MUJOCO_GL={chosen} does not draw" if chosen else f"none of {', '.join(tried)} draws"
     raise MissingExtraError(
         f"no offscreen OpenGL on this machine, {said}; on Debian or Ubuntu install: apt-get install libegl1"
         " libgl1-mesa-dri (no graphics card is needed)",
-        backends=backends,
+        backends=tried,
     )
 
 

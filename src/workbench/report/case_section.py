@@ -19,6 +19,7 @@ from workbench.report.figures import motion_plots, reaction_plot, torque_plots
 from workbench.report.load import ErrorRow, Run, Series
 from workbench.report.manifest import CaseRecord
 from workbench.report.mechanism import mechanism_plot
+from workbench.report.pictures import Film
 from workbench.report.plot import Plot
 from workbench.report.tables import CASE_STATUS, KINDS, Cell, Status, Table, columns, verdict_status
 from workbench.report.text import error_fraction, exact, percent, pretty_unit, scientific, with_unit
@@ -47,6 +48,8 @@ class CaseView:
     mechanism: Plot | None
     reactions: Plot | None
     tables: tuple[Table, ...]
+    film: Film | None = None
+    """rendered pictures of the robot in this case, or why there are none; on one case of a run"""
     times: str = ""
     """first and last moment, and the moment of the largest error, for the time slider"""
 
@@ -62,7 +65,7 @@ class CaseView:
         return self.motion + self.torques + others
 
 
-def case_view(run: Run, case: str, anchor: str, series: Series | None) -> CaseView:
+def case_view(run: Run, case: str, anchor: str, series: Series | None, film: Film | None = None) -> CaseView:
     """Collect the section of one case; *series* is None for a case that was not computed."""
     record = run.manifest.cases[case]
     rows = run.rows_of_case[case]
@@ -86,6 +89,7 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None) -> CaseVi
         mechanism=mechanism_plot(run, case, anchor, series) if series is not None else None,
         reactions=reaction_plot(run, case, anchor, series) if series is not None else None,
         tables=tuple(table for table in tables if table.rows),
+        film=film if film is not None and film.case == case else None,
         times=_times(rows, series) if series is not None else "",
     )
 

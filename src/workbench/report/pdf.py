@@ -7,9 +7,11 @@ import textwrap
 import warnings
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
+from PIL import Image
 
 from workbench.report.case_section import CaseView
 from workbench.report.cost import cost_table
@@ -99,6 +101,19 @@ class Pages:
                 rows[-1].append(plot)
         for row in rows:
             self._plot_row(row)
+
+    def picture(self, content: bytes, caption: str) -> None:
+        """Set a picture of pixels, half as wide as the page."""
+        with Image.open(io.BytesIO(content)) as image:
+            pixels = np.asarray(image.convert("RGB"))
+        width = self.width / 2
+        height = width * pixels.shape[0] / pixels.shape[1]
+        page = self.room(height + 0.3)
+        axes = page.add_axes((MARGIN / A4[0], 1 - (self._y + height) / A4[1], width / A4[0], height / A4[1]))
+        axes.imshow(pixels, aspect="auto")
+        axes.set_axis_off()
+        self._put(page, MARGIN, caption, SMALL_PRINT, below=height + 0.05)
+        self._y += height + 0.35
 
     def _plot_row(self, row: list[Plot]) -> None:
         alone = row[0].size[0] > FULL_WIDTH_FROM
@@ -230,6 +245,8 @@ def _set_case(pages: Pages, view: CaseView) -> None:
             pages.lines(text, BODY)
     pages.lines("; ".join(f"{what.lower()} {value}" for what, value in view.facts), BODY, after=0.15)
     pages.plots(view.plots)
+    if view.film is not None and view.film.still:
+        pages.picture(view.film.still, "The robot's model as MuJoCo renders it, at the first moment of this case")
     for table in view.tables:
         pages.table(table)
 

@@ -14,6 +14,7 @@ from workbench.report.case_section import CaseView, case_view
 from workbench.report.error_sections import claims_section, worst_section
 from workbench.report.load import Run, Series
 from workbench.report.manifest import FigureRecord, Manifest
+from workbench.report.pictures import film_of
 from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.tables import CASE_STATUS, CHECKED, NOT_COMPUTED, Cell, Table, columns
@@ -45,9 +46,10 @@ def build_sections(run: Run) -> list[Section]:
     keys = list(unique_keys("figure", [f"{i}\n{figure.id}" for i, figure in enumerate(figures)]).values())
     drawn: dict[int, Plot | str] = {}
     views = []
+    film = film_of(run)
     for name, record in run.manifest.cases.items():
         series: Series | None = None if record.status in NOT_COMPUTED else run.series(name)
-        views.append(case_view(run, name, anchors[name], series))
+        views.append(case_view(run, name, anchors[name], series, film))
         for index, figure in enumerate(figures):
             if figure.case == name and figure.kind != "error_over":
                 drawn[index] = (

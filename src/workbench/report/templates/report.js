@@ -238,12 +238,32 @@
     }
   }
 
+  /* ---- rendered frames, on one sheet ---- */
+  class Film {
+    constructor(figure) {
+      this.times = figure.dataset.film.split(" ").map(Number);
+      this.columns = Number(figure.dataset.columns);
+      this.rows = Math.ceil(this.times.length / this.columns);
+      this.sheet = figure.querySelector("img");
+    }
+
+    show(time) {
+      let nearest = 0;
+      this.times.forEach((t, k) => {
+        if (Math.abs(t - time) < Math.abs(this.times[nearest] - time)) nearest = k;
+      });
+      const [row, column] = [Math.floor(nearest / this.columns), nearest % this.columns];
+      this.sheet.style.transform = `translate(${-100 * column / this.columns}%, ${-100 * row / this.rows}%)`;
+    }
+  }
+
   class Figure {
     constructor(figure, group) {
       this.svg = figure.querySelector("svg");
-      const told = JSON.parse(this.svg.dataset.panels ?? "[]");
+      const told = JSON.parse(this.svg?.dataset.panels ?? "[]");
       this.panels = told.map((panel, number) => new Panel(this.svg, panel, number));
       if (this.panels.length) this.panels.at(-1).isLowest = true;
+      this.film = figure.dataset.film ? new Film(figure) : null;
       this.mechanism = figure.dataset.frames ? new Mechanism(this.svg, JSON.parse(figure.dataset.frames)) : null;
       if (!this.panels.length) return;
       this.readout = make("p", { class: "readout" });
@@ -260,6 +280,7 @@
 
     show(time) {
       this.mechanism?.show(time ?? 0);
+      this.film?.show(time ?? 0);
       if (!this.panels.length) return;
       const told = this.panels.map((panel) => panel.mark(time)).filter(Boolean);
       this.readout.textContent = time === null ? "" : `t = ${short(time)} s · ${told.join(" · ")}`;
@@ -273,7 +294,7 @@
       this.shown = null;
       this.window = [this.start, this.stop];
       this.figures = [...document.querySelectorAll("figure[data-case]")]
-        .filter((figure) => figure.dataset.case === article.id && figure.querySelector("svg"))
+        .filter((figure) => figure.dataset.case === article.id && figure.querySelector("svg, .film"))
         .map((figure) => new Figure(figure, this));
       if (!this.figures.length || !(this.stop > this.start)) return;
       const bar = make("div", { class: "times", role: "group", "aria-label": `Time in ${article.id.slice(5)}` });

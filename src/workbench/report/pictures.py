@@ -1,0 +1,114 @@
+"""The rendered pictures that a run has stored: a still of the robot, and a sheet of frames that the page plays.
+
+A report draws nothing itself: the same stored pictures give the same bytes on every machine.
+"""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from workbench.errors import OutputError
+from workbench.report.load import Run, read_text, short
+from workbench.report.manifest import Record
+
+FOLDER, RECORD, STILL, FILM = "pictures", "pictures.json", "mechanism.webp", "film.webp"
+FORMAT_VERSION = 1
+LARGEST = 1_000_000
+"""Bytes of a picture that goes into the page."""
+OTHER_MODEL = "the stored pictures show another model"
+
+
+class PicturesRecord(Record):
+    """pictures.json."""
+
+    format: int
+    note: str = ""
+    """why there are no pictures; empty where there are some"""
+    case: str = ""
+    model_sha256: str = ""
+    columns: int = 1
+    width: int = 1
+    height: int = 1
+    times: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Film:
+    """The robot of one case in motion; or, where ``note`` is set, why it cannot be shown."""
+
+    case: str
+    note: str = ""
+    record: PicturesRecord | None = None
+    sheet: bytes = field(default=b"", repr=False)
+    still: bytes = field(default=b"", repr=False)
+    """the picture at the first moment"""
+    still_file: str = f"{FOLDER}/{STILL}"
+
+    @property
+    def address(self) -> str:
+        """The sheet of frames as an address that loads nothing."""
+        return f"data:image/webp;base64,{base64.b64encode(self.sheet).decode('ascii')}"
+
+    @property
+    def times(self) -> str:
+        """Seconds of the frames."""
+        return " ".join(f"{time:g}" for time in self.record.times) if self.record else ""
+
+    @property
+    def rows(self) -> int:
+        """Rows of the sheet."""
+        return -(-len(self.record.times) // self.record.columns) if self.record else 1
+
+    @property
+    def alt(self) -> str:
+        """What stands for the picture."""
+        return (
+            f"The robot's model, rendered by MuJoCo, in the course of case {self.case}; without a script, at its first "
+            "moment."
+        )
+
+
+def film_of(run: Run) -> Film | None:
+    """Read the stored pictures; None where the run was told to make none.
+
+    Raises
+    ------
+    OutputError
+        The record is torn or of another format; a picture is missing, not WebP, or too large for a page.
+    """
+    path = run.directory / FOLDER / RECORD
+    if not path.exists():
+        return None
+    try:
+        record = PicturesRecord.model_validate_json(read_text(path))
+    except ValidationError as error:
+        raise OutputError(f"{path}: not a record of pictures ({short(error)})") from error
+    if record.format != FORMAT_VERSION:
+        raise OutputError(f"{path}: format {record.format} is not supported; allowed: {FORMAT_VERSION}", key="format")
+    first = next(iter(run.manifest.cases), "")
+    if record.note:
+        return Film(first, record.note)
+    if record.model_sha256 != run.manifest.model.sha256:
+        return Film(first, OTHER_MODEL)
+    if (
+        record.case not in run.manifest.cases
+        or not record.times
+        or min(record.columns, record.width, record.height) < 1
+    ):
+        raise OutputError(f"{path}: case {record.case!r} with {len(record.times)} frames; needed: a case of the run")
+    folder = run.directory / FOLDER
+    return Film(record.case, "", record, _webp(folder / FILM), _webp(folder / STILL))
+
+
+def _webp(path: Path) -> bytes:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be read ({short(error)})") from error
+    if content[:4] != b"RIFF" or content[8:12] != b"WEBP" or len(content) > LARGEST:
+        raise OutputError(f"{path}: {len(content)} bytes; allowed: a WebP picture of at most {LARGEST} bytes")
+    return content
