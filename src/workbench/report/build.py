@@ -18,7 +18,6 @@ from workbench.errors import OutputError
 from workbench.report.cost import cost_table
 from workbench.report.latex import latex_table
 from workbench.report.load import Run, load_run, read_manifest
-from workbench.report.pdf import all_tables, figure_pdf, report_pdf
 from workbench.report.section import Section
 from workbench.report.sections import build_sections
 from workbench.report.style import STYLES, figure_style
@@ -98,6 +97,8 @@ def _check_choice(what: str, given: Sequence[str], allowed: Iterable[str]) -> No
 
 def _rendered(run: Run | SweepRun, sections: list[Section], formats: Sequence[str]) -> dict[Path, bytes]:
     files: dict[Path, bytes] = {}
+    if "pdf" in formats:
+        from workbench.report.pdf import all_tables, figure_pdf, report_pdf  # half a second of imports
     figures = run.directory / FIGURES
     for number, plot in enumerate(plot for section in sections for plot in section.plots):
         if number % COLLECT_EVERY == COLLECT_EVERY - 1:
@@ -192,9 +193,11 @@ def _few_collections() -> Iterator[None]:
     """Hold garbage collection back while figures are drawn: it takes a quarter of the time and frees little."""
     enabled = gc.isenabled()
     gc.disable()
+    gc.freeze()  # what is there before the first figure need not be looked through
     try:
         yield
     finally:
+        gc.unfreeze()
         if enabled:
             gc.enable()
 

@@ -88,7 +88,7 @@ class Run:
         try:
             # read_table of a Python file leaves threads behind that abort an interpreter which ends soon after
             table = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(path.read_bytes())).read(use_threads=False)
-            columns = {name: np.asarray(table.column(name), dtype=np.float64) for name in table.column_names}
+            columns = {name: _floats(table.column(name)) for name in table.column_names}
         except FileNotFoundError as error:
             raise OutputError(f"{path}: missing, though manifest.json lists case {case!r} as computed") from error
         except (OSError, ValueError, pyarrow.ArrowException) as error:
@@ -105,6 +105,14 @@ class Run:
                 raise OutputError(f'{path}: column "{name}" is missing; needed: {", ".join(needed)}', column=name)
         if len(columns["t"]) == 0:
             raise OutputError(f"{path}: holds no samples; allowed: at least 1")
+
+
+def _floats(column: pyarrow.ChunkedArray) -> FloatArray:
+    """Return a column as numbers; not by Arrow's own `to_numpy`, which imports pandas first: a second."""
+    whole = column.combine_chunks()
+    if whole.null_count or not len(whole):
+        return np.asarray(whole.to_numpy(zero_copy_only=False), dtype=np.float64)
+    return np.array(np.from_dlpack(whole), dtype=np.float64)
 
 
 def load_run(directory: Path) -> Run:

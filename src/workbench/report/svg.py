@@ -38,6 +38,7 @@ _UPRIGHT = re.compile(r' transform="rotate\(-?0 [^"]*"')
 _FONT = re.compile(r"font-family: [^;\"]*")
 _IDENTIFIER = re.compile(r'(?<=<)(\w+)([^<>]*?) id="([^"<>]*)"')
 _REFERENCE = re.compile(r'(url\(#|href="#)([^")]+)')
+_GROUP = re.compile(r"<g(?: [^>]*)?>\n?|</g>\n?")
 _SVG_TAG = re.compile(r"<svg[^>]*>")
 _PANELS = re.compile(r'data-panels="[^"]*"')
 _VIEW_BOX = re.compile(r'viewBox="([^"]*)"')
@@ -127,39 +128,62 @@ def compact(svg: str, key: str) -> str:
 
     svg = _IDENTIFIER.sub(identifier, svg)
     svg = _REFERENCE.sub(lambda match: f"{match[1]}{short[match[2]]}", svg)
-    return re.sub(r"\n\s*", "\n", svg)
+    return _without_bare_groups(re.sub(r"\n\s*", "\n", svg))
 
 
 def _relative(path: str) -> str:
-    """Write a path in hundredths of a point, with lines as steps from point to point: two thirds of the bytes."""
+    """Write a path in tenths of a point, with lines as steps from point to point: half of the bytes.
+
+    The curve that matplotlib draws may leave the data by `path.simplify_threshold`, four of these tenths; steps lead
+    from rounded place to rounded place, so that they do not add up to an error.
+    """
     pieces: list[str] = []
     x = y = 0
     for kind, first, second, other in _STEP.findall(path):
         if other or kind not in "ML":
             return path  # curves, of markers: short anyway
-        to_x, to_y = round(100 * float(first)), round(100 * float(second))
-        pieces.append(
-            f"M{_hundredths(to_x)} {_hundredths(to_y)}"
-            if kind == "M"
-            else f"l{_hundredths(to_x - x)} {_hundredths(to_y - y)}"
-        )
+        to_x, to_y = round(10 * float(first)), round(10 * float(second))
+        if kind == "M":
+            pieces.append(f"M{_tenths(to_x)} {_tenths(to_y)}")
+        elif (to_x, to_y) != (x, y):
+            pieces.append(f"l{_tenths(to_x - x)} {_tenths(to_y - y)}")
         x, y = to_x, to_y
     return "".join(pieces) + ("z" if path.rstrip().endswith("z") else "")
 
 
-def _hundredths(value: int) -> str:
-    return f"{value / 100:.2f}".rstrip("0").rstrip(".").replace("-0.", "-.").removeprefix("0") or "0"
+def _tenths(value: int) -> str:
+    whole, tenth = divmod(abs(value), 10)
+    sign = "-" if value < 0 else ""
+    return f"{sign}{whole or ''}.{tenth}" if tenth else f"{sign}{whole}"
+
+
+def _without_bare_groups(svg: str) -> str:
+    """Take away groups that say nothing."""
+    kept: list[bool] = []
+
+    def group(match: re.Match[str]) -> str:
+        if match[0].startswith("</"):
+            return match[0] if kept.pop() else ""
+        kept.append(match[0].strip() != "<g>")
+        return match[0] if kept[-1] else ""
+
+    return _GROUP.sub(group, svg)
 
 
 class StyleSheet:
-    """Gathers the styles of all drawings of a page, so that each is written once."""
+    """Gathers the styles of all drawings of a page, so that each is written once; gives identifiers short names."""
 
     def __init__(self) -> None:
         self._names: dict[str, str] = {}
+        self._identifiers = 0
 
     def shorten(self, svg: str) -> str:
-        """Replace every ``style`` attribute by a class."""
+        """Replace every ``style`` attribute by a class, and identifiers by numbers that no other drawing has."""
         svg = svg.replace("xlink:href", "href")
+        for name in dict.fromkeys(match[2] for match in _REFERENCE.finditer(svg)):
+            self._identifiers += 1
+            for before, after in (('id="', '"'), ("url(#", ")"), ('href="#', '"')):
+                svg = svg.replace(f"{before}{name}{after}", f"{before}s{self._identifiers}{after}")
         return _STYLE.sub(lambda match: f' class="{self._name(match[1])}"', svg)
 
     def _name(self, style: str) -> str:
