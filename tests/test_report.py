@@ -599,7 +599,7 @@ def test_only_the_pages_own_script_may_run(run: Path) -> None:
     text = (run / "report.html").read_text(encoding="utf-8")
     (script,) = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    assert f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'" in text
+    assert f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'" in text
 
 
 def test_plots_tell_the_script_their_scales(run: Path) -> None:

@@ -9,7 +9,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from workbench.arrays import FloatArray
 from workbench.report.curves import DASHES
-from workbench.report.layout import SMALLEST_DRAWN, WIDE, figure_legend, legend_rows, stack
+from workbench.report.layout import SMALLEST_DRAWN, WIDE, figure_legend, legend_rows, size_of, stack
 from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.style import ALARM, INK, PALETTE
@@ -24,6 +24,8 @@ LIMITS = (0.01, 0.02, 0.05, 0.1)
 CURVE_POINTS = 240
 """Points of a curve of the distribution: more than pixels tell apart."""
 BARS = 36
+NARROW = 4.5
+"""inches: figures that are drawn narrower have fewer numbers on their axes"""
 LARGEST = "worst joint"
 SHOWN_DRIVERS = 4
 MATTERS = 0.06
@@ -188,7 +190,7 @@ def _distribution_plot(run: SweepRun, key: str, candidate: str, reference: str, 
             above.annotate(f"bound {bound:g}", (bound, 0.05), (-3, 0), xycoords=("data", "axes fraction"),
                            textcoords="offset points", color=ALARM, fontsize=7.5, ha="right", va="bottom")  # fmt: skip
         for axes in (above, below):
-            _error_axis(axes, lowest / 1.15, highest * 1.15, modelling)
+            _error_axis(axes, lowest / 1.15, highest * 1.15, modelling, size_of(figure)[0] < NARROW)
         above.set_ylim(0.0, 1.02)
         above.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.0f} %"))
         above.set_ylabel("designs below")
@@ -214,12 +216,12 @@ def _share_curve(axes: Axes, values: FloatArray, label: str, **style: object) ->
     axes.plot(np.quantile(values, shares), shares, label=label, **style)  # type: ignore[arg-type]
 
 
-def _error_axis(axes: Axes, low: float, high: float, modelling: bool) -> None:
+def _error_axis(axes: Axes, low: float, high: float, modelling: bool, narrow: bool) -> None:
     axes.set_xscale("log")
     axes.set_xlim(low, high)
     first, last = int(np.floor(np.log10(low))), int(np.ceil(np.log10(high)))
     if modelling and last - first <= 4:
-        ticks = [base * 10.0**power for power in range(first, last + 1) for base in (1, 2, 5)]
+        ticks = [base * 10.0**power for power in range(first, last + 1) for base in ((1,) if narrow else (1, 2, 5))]
     else:
         ticks = [10.0**power for power in range(first, last + 1, max(1, (last - first) // 5))]
     axes.xaxis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
