@@ -112,10 +112,42 @@ def test_tables_sort_and_filter(chromium: Any, sweep_file: Path) -> None:
         assert trouble == []
 
 
+CELLS = """(table) => [...table.tBodies[0].rows].map((row) => [...row.querySelectorAll("td")].map((cell) =>
+    [cell.firstChild.textContent, cell.querySelector("small")?.textContent ?? ""]))"""
+
+
+def test_any_two_numbers_can_be_mapped(chromium: Any, sweep_file: Path) -> None:
+    with opened(chromium, sweep_file) as (page, trouble):
+        picker = page.locator(".picker")
+        table, (what, across, down) = picker.locator("table"), picker.locator("select").all()
+        static = page.locator("#table-map-1 tbody tr").evaluate_all(
+            "(rows) => rows.map((row) => [...row.cells].slice(1).map((cell) => cell.textContent))"
+        )
+        medians = [[f"{float(cell.split(' ')[0]):g} %" if "%" in cell else cell for cell in row] for row in static]
+        counts = [[cell.partition("(")[2].strip(")") for cell in row] for row in static]
+        shown = table.evaluate(CELLS)
+        assert [[cell[0] for cell in row] for row in shown] == medians
+        assert [[cell[1] for cell in row] for row in shown] == counts
+        what.select_option("3")
+        largest = [[cell.partition(", ")[2].partition(" ")[0] for cell in row] for row in static]
+        for row, cells in zip(table.evaluate(CELLS), largest, strict=True):
+            assert [cell[0] for cell in row] == [f"{float(cell):g} %" if cell else "–" for cell in cells]
+        what.select_option("2")
+        first, second = across.input_value(), down.input_value()
+        across.select_option(second)
+        assert "different" in picker.locator(".shows").inner_text()
+        assert table.locator("tr").count() == 0
+        down.select_option(first)
+        turned = [list(column) for column in zip(*shown[::-1], strict=True)][::-1]
+        assert table.evaluate(CELLS) == turned
+        assert trouble == []
+
+
 def test_readable_without_a_script(chromium: Any, sweep_file: Path) -> None:
     with opened(chromium, sweep_file, java_script_enabled=False) as (page, trouble):
         assert page.locator("figure svg").count() == FIGURES
         assert page.locator("#table-map-1 tbody tr").count() == 8
+        assert page.locator(".picker *").count() == 0
         assert trouble == []
 
 

@@ -80,7 +80,7 @@ def heat_section(run: SweepRun) -> Section | None:
     for place, pair in enumerate(pairs):
         keys = [d.key for d in run.summary.drivers_of(*pair) if run.key(d.key) is not None][:STRONGEST]
         for turn, (first, second) in enumerate(itertools.combinations(keys, 2)):
-            found = _map(run, pair, first, second)
+            found = map_over(run, pair, first, second)
             if found is None:
                 continue
             against = f"{pair[0]} against the {pair[1]} reference"
@@ -116,7 +116,8 @@ def _bins(run: SweepRun, key: str, kept: NDArray[np.bool_]) -> Bins:
     return Bins(label, edges, False, np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1))
 
 
-def _map(run: SweepRun, pair: tuple[str, str], first: str, second: str) -> Map | None:
+def map_over(run: SweepRun, pair: tuple[str, str], first: str, second: str) -> Map | None:
+    """Return the errors of a comparison over two keys, *first* in columns; None where one of them does not vary."""
     errors = run.worst[pair]
     kept = np.isfinite(errors)
     across, down = _bins(run, first, kept), _bins(run, second, kept)

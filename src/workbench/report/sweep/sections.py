@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from workbench.report.section import Section
@@ -11,6 +13,7 @@ from workbench.report.sweep.drivers import drivers_section
 from workbench.report.sweep.errors import errors_section
 from workbench.report.sweep.heat import heat_section
 from workbench.report.sweep.load import SweepRun
+from workbench.report.sweep.picker import picker_data
 from workbench.report.sweep.varied import varied_section
 from workbench.report.sweep.verdict import GOOD, number, verdict_section
 
@@ -22,7 +25,7 @@ def sweep_sections(run: SweepRun) -> list[Section]:
         varied_section(run),
         errors_section(run),
         drivers_section(run),
-        heat_section(run),
+        _maps_section(run),
         worst_section(run),
         trouble_section(run),
         parameters_section(run.manifest),
@@ -30,6 +33,18 @@ def sweep_sections(run: SweepRun) -> list[Section]:
         _limits_section(run),
     ]
     return [section for section in sections if section is not None]
+
+
+def _maps_section(run: SweepRun) -> Section | None:
+    """Show maps over the strongest drivers, and let the reader choose any other two numbers where scripts run."""
+    section = heat_section(run)
+    if section is None:
+        return None
+    pairs = dict.fromkeys((d.candidate, d.reference) for d in run.summary.drivers)
+    pickers = [(f"{candidate} against the {reference} reference", picker_data(run, (candidate, reference)))
+               for candidate, reference in pairs]  # fmt: skip
+    told = [picker for picker in pickers if picker[1]]
+    return dataclasses.replace(section, context={**section.context, "pickers": told})
 
 
 def _limits_section(run: SweepRun) -> Section:

@@ -75,6 +75,86 @@
     });
   }
 
+  /* ---- maps of a sweep over any two of its numbers ---- */
+  const luminance = (colour) => [1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16) / 255)
+    .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, c, k) => sum + c * [0.2126, 0.7152, 0.0722][k], 0);
+
+  class Picker {
+    constructor(place, number) {
+      const told = JSON.parse(place.dataset.maps);
+      this.keys = told.keys;
+      this.maps = told.maps;
+      this.shades = told.shades;
+      const known = this.keys.map((key, k) => [k, key?.name]).filter(([, name]) => name !== undefined);
+      const line = make("p");
+      const choice = (label, options, chosen) => {
+        const select = make("select");
+        for (const [value, text] of options) select.append(make("option", { value }, text));
+        select.value = chosen;
+        select.addEventListener("change", () => this.show());
+        const around = make("label", {}, `${label} `);
+        around.append(select);
+        line.append(around);
+        return select;
+      };
+      this.what = choice("Error", [[2, "median of the designs"], [3, "largest of the designs"]], 2);
+      this.across = choice("over", known, known[0][0]);
+      this.down = choice("and", known, known[1][0]);
+      this.title = make("p", { class: "shows", id: `picker-${number}`, "aria-live": "polite" });
+      this.about = place.dataset.title;
+      const box = make("div", { class: "scroll", tabindex: "0", role: "region", "aria-labelledby": `picker-${number}` });
+      this.table = make("table", { "aria-labelledby": `picker-${number}` });
+      box.append(this.table);
+      place.append(make("h3", {}, "Any two numbers"), line, this.title, box);
+      this.show();
+    }
+
+    show() {
+      const [what, i, j] = [this.what, this.across, this.down].map((select) => Number(select.value));
+      this.table.replaceChildren();
+      const found = this.maps.find(([a, b]) => (a === i && b === j) || (a === j && b === i));
+      if (!found) {
+        this.title.textContent = "Choose two different numbers.";
+        return;
+      }
+      const swapped = found[0] !== i;
+      const [columns, rows] = [this.keys[i].bins, this.keys[j].bins];
+      const at = (list, row, column) => list[swapped ? column * rows.length + row : row * columns.length + column];
+      const known = [...found[2], ...found[3]].filter((value) => value > 0);
+      const [low, high] = [Math.min(...known), Math.max(...known)];
+      const head = make("tr");
+      head.append(make("th", { scope: "col" }, `${this.keys[j].name} \\ ${this.keys[i].name}`));
+      for (const text of columns) head.append(make("th", { scope: "col" }, text));
+      const top = make("thead");
+      top.append(head);
+      const body = make("tbody");
+      for (let row = rows.length - 1; row >= 0; row -= 1) {
+        const line = make("tr");
+        line.append(make("th", { scope: "row" }, rows[row]));
+        columns.forEach((_, column) => {
+          const value = at(found[what], row, column);
+          const cell = make("td", {}, value === null ? "–" : `${value} %`);
+          if (value !== null) {
+            const share = high > low ? Math.log(Math.max(value, low) / low) / Math.log(high / low) : 0;
+            const shade = this.shades[Math.round(share * (this.shades.length - 1))];
+            cell.style.background = shade;
+            cell.style.color = luminance(shade) > 0.18 ? "#010101" : "#fefefe";
+            cell.append(make("small", {}, String(at(found[4], row, column))));
+          }
+          line.append(cell);
+        });
+        body.append(line);
+      }
+      this.table.append(top, body);
+      const kind = what === 2 ? "Median" : "Largest";
+      this.title.textContent = `${kind} error of ${this.about} over ${this.keys[i].name} (columns) and `
+        + `${this.keys[j].name} (rows), with the number of designs below it.`;
+    }
+  }
+
+  document.querySelectorAll(".picker").forEach((place, number) => new Picker(place, number + 1));
+
   /* ---- plots over time ---- */
   const parsePath = (d) => {
     const found = [];
