@@ -65,17 +65,18 @@ test-browser: $(STAMP) ## Run the tests that open a report in Chromium
 # Rendered pictures depend on the machine's OpenGL, so those that are kept are used again; remove them to draw new ones.
 reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings in their heads differ
 	@for name in $(PUBLISHED); do \
-	  built=build/reports/$$name; kept=reports/published/$$name; \
-	  if [ -d $$kept/pictures ]; then \
-	    $(BIN)/workbench run campaigns/$$name.toml --no-pictures --out $$built && \
-	    cp -R $$kept/pictures $$built/pictures && $(BIN)/workbench report $$built >/dev/null || exit 1; \
-	  else \
-	    $(BIN)/workbench run campaigns/$$name.toml --out $$built || exit 1; \
+	  built=build/reports/$$name; kept=reports/published/$$name; drawn=build/pictures/$$name; \
+	  if [ ! -d $$kept/pictures ]; then \
+	    $(BIN)/workbench run campaigns/$$name.toml --quick --out $$drawn >/dev/null || exit 1; \
+	    if [ -f $$drawn/pictures/film.webp ]; then mkdir -p $$kept; cp -R $$drawn/pictures $$kept/pictures; fi; \
 	  fi; \
-	  rm -rf $$kept; \
+	  $(BIN)/workbench run campaigns/$$name.toml --no-pictures --out $$built || exit 1; \
+	  if [ -d $$kept/pictures ]; then \
+	    cp -R $$kept/pictures $$built/pictures && $(BIN)/workbench report $$built >/dev/null || exit 1; \
+	  fi; \
+	  rm -rf $$kept/report.html $$kept/report.md $$kept/figures; \
 	  mkdir -p $$kept; \
 	  cp -R $$built/report.html $$built/report.md $$built/figures $$kept || exit 1; \
-	  if [ -f $$built/pictures/film.webp ]; then cp -R $$built/pictures $$kept; fi; \
 	done
 
 bench: $(STAMP) ## Measure speed, as ratios in one run (BENCH_ARGS=--quick to try it); results in benchmarks/results
