@@ -133,7 +133,7 @@ def _table(path: Path, columns: tuple[str, ...]) -> pa.Table:
             missing = [name for name in columns if name not in known]
             if missing:
                 raise OutputError(f'{path}: column "{missing[0]}" is missing', column=missing[0])
-            return file.read(columns=list(columns))
+            return file.read(columns=list(columns), use_threads=False)
     except (OSError, ValueError, pa.ArrowException) as error:
         raise OutputError(f"{path}: not a readable Parquet file ({short(error)})") from error
 
