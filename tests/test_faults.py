@@ -20,11 +20,13 @@ import sweep_faults
 import sweep_tasks
 from small_campaign import Workbench
 from sweep_campaign import SWEEP
+from test_report import parse
 from workbench.campaign.sweep import run as sweep_run
 from workbench.campaign.sweep.evaluate import Context
 from workbench.campaign.sweep.run import SweepOptions
 from workbench.campaign.sweep.supervisor import Lost, Supervisor, cause
 from workbench.errors import WorkbenchError
+from workbench.report.build import build_report
 
 
 @pytest.fixture
@@ -186,6 +188,12 @@ def test_each_faulty_case_has_one_status_and_all_others_are_done(
     # time series stand for those that left any, and did not pass
     names = sorted(path.name for path in (workbench.directory / "run" / "series").iterdir())
     assert names == ["variant-000021.parquet", "variant-000027.parquet"]
+    # the report counts each as what it is
+    build_report(workbench.directory / "run", ["html"])
+    table = parse(workbench.directory / "run").tables["not-passed"]
+    assert {int(row[0].rpartition("-")[2]): row[1].split()[-1].lower() for row in table[1:]} == {
+        index: {"timeout": "out"}.get(status, status) for index, status in EXPECTED.items()
+    }
     # what failed is tried again where that is asked for, and only then
     monkeypatch.undo()
     monkeypatch.chdir(workbench.directory)

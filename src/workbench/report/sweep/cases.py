@@ -155,5 +155,5 @@ def _not_passed(run: SweepRun) -> Table:
         f"The cases that did not pass, {more}.",
         columns(("Case", "Outcome", *(["Series"] if kept else []), "Reason", *keys), numeric=keys),
         rows,
-        "Then the numbers that make the case; cases/ in the run directory holds every case.",
+        "After the reason stand the numbers that make the case; cases/ in the run directory holds every case.",
     )
