@@ -101,6 +101,7 @@ FAULTS = {
     "raises": ("    return p.nope * q", "(mine.py:7) AttributeError: 'Parameters' object has no attribute 'nope'"),
     "wrong shape": ("    return q[:, 0]", "(mine.py:4) returns an array of shape (41,); expected (41, 1)"),
     "not finite": ("    return np.where(q > 1.2, np.nan, q)", "(mine.py:4) returns nan for sample"),
+    "leaves": ("    raise SystemExit(0)", "(mine.py:7) SystemExit: 0"),
     "text": ("    return 'q'", "(mine.py:4) returns str; expected numbers"),
     "complex": ("    return q * 1j", "(mine.py:4) returns complex"),
     "writes": ("    q[0] = 0.0\n    return q", "(mine.py:7) ValueError: assignment destination is read-only"),
@@ -176,6 +177,7 @@ COMPLAINTS = {
     "nothing registered": ("empty.py", "x = 1\n", "empty.py: no candidate is registered in it"),
     "syntax": ("bad.py", "def f(:\n", "bad.py:1: invalid syntax"),
     "fails on import": ("bad.py", "\n\n1 / 0\n", "bad.py:3: ZeroDivisionError"),
+    "leaves on import": ("bad.py", "import sys\nsys.exit(0)\n", "bad.py:2: SystemExit: 0"),
     "signature": (
         "bad.py",
         "import workbench\n@workbench.candidate\ndef f(q):\n    return q\n",

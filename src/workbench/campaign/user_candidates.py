@@ -89,7 +89,7 @@ class UserCandidate:
                 found = self._function(mechanism.parameters, *given)
         except _TooSlow as error:
             raise self._fault(f"takes more than {LIMIT_S:g} s for {len(q)} samples", error) from error
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # an exit code of theirs would be taken for the verdict
             raise self._fault(f"{type(error).__name__}: {error}", error) from error
         self._taken.append((time.perf_counter() - begun) / max(len(q), 1))
         return self._checked(found, q.shape, mechanism.joints)
@@ -247,7 +247,7 @@ def _run(name: str, load: Any) -> ModuleType:
         module: ModuleType = load()
     except SyntaxError as error:
         raise SpecError(f"{name}:{error.lineno}: {error.msg}", file=name) from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # an exit code of theirs would be taken for the verdict
         own = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).name == Path(name).name]
         line = f":{own[-1].lineno}" if own else ""
         raise SpecError(f"{name}{line}: {type(error).__name__}: {error}", file=name) from error
