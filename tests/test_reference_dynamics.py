@@ -413,6 +413,35 @@ def test_lumped_bars_keep_mass_and_lose_inertia(tmp_path: Path) -> None:
     assert peak_error(distributed, whole) < DIFFERENCES
 
 
+@pytest.mark.parametrize("option", ['settotalmass="20"', 'boundinertia="0.01"'])
+def test_a_compiler_option_that_makes_lumped_bars_others_is_refused(tmp_path: Path, option: str) -> None:
+    text = MODEL.read_text(encoding="utf-8")
+    path = tmp_path / "model.xml"
+    path.write_text(text.replace('autolimits="true"', f'autolimits="true" {option}'), encoding="utf-8")
+    reference = wb.MujocoReference(path)
+    home = np.array([[0.01, 0.78, 0.74]])
+    still = 0.0 * home
+    with pytest.raises(ModelError, match=r"model\.xml: the model with lumped masses cannot be made, body_"):
+        reference.inverse_dynamics(home, still, still, "lumped")
+    # the model as it stands is one robot, whatever made it so
+    expected = wb.load_mechanism(path).inverse_dynamics(home, still, still)
+    assert peak_error(reference.inverse_dynamics(home, still, still).tau, expected) < 1e-10
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_the_engines_warnings_leave_no_log_behind(
+    tmp_path: Path, threads: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A platform next to no mass: MuJoCo prints that its mass matrix is nearly singular, and writes a log file."""
+    monkeypatch.chdir(tmp_path)
+    reference = wb.MujocoReference(MODEL, threads=threads, m3=1e-15)
+    home = np.tile([[0.0, 0.78, 0.74]], (1100, 1))
+    for mass_model in ("distributed", "lumped"):
+        reference.inverse_dynamics(home, 0.0 * home, 0.0 * home, mass_model)
+    assert list(tmp_path.iterdir()) == []
+    assert capfd.readouterr() == ("", "")
+
+
 def test_lumped_without_names_or_with_a_wrong_one_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="lumped_bodies"):
         four_bar(tmp_path).inverse_dynamics(*columns(STATES), "lumped")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -94,12 +95,17 @@ def find_model(path: str | Path) -> Path:
 
 @contextlib.contextmanager
 def engine_warnings() -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings; left alone it prints them and writes a log file into the current directory."""
+    """Collect MuJoCo's warnings; left alone it prints them and writes a log file into the current directory.
+
+    Those of a specification's own ``compile`` come as Python's UserWarning, and are dropped.
+    """
     collected: list[str] = []
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(collected.append)
     try:
-        yield collected
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            yield collected
     finally:
         mujoco.set_mju_user_warning(before)
 

@@ -18,11 +18,15 @@ import numpy as np
 from mujoco.batch import Batch
 
 from workbench.arrays import FloatArray
-from workbench.errors import ParameterError
+from workbench.errors import ModelError, ParameterError
+from workbench.mjcf import engine_warnings
 
 LUMPED_INERTIA = 2e-15
 """kg m^2: what stands for "no rotational inertia"; MuJoCo refuses less than 1e-15. Against the smallest bar of the two
 papers (1e-3 kg m^2) it is worth 1e-12."""
+
+SAME_BODY = 1e-12
+"""Relative: masses and inertias of two compilations that differ by more are those of two robots."""
 
 BLOCK = 512
 """Samples evaluated at a time; some 3 kB each."""
@@ -30,10 +34,16 @@ BLOCK = 512
 MOST_THREADS = 256
 
 
-def without_bar_inertia(text: str, bodies: tuple[str, ...]) -> mujoco.MjModel:
+@engine_warnings()
+def without_bar_inertia(text: str, bodies: tuple[str, ...], file: str) -> mujoco.MjModel:
     """Compile the model with the rotational inertia of the named bodies removed: the lumped-mass assumption.
 
     The specification is changed and compiled again; writing into a compiled model can be silently wrong.
+
+    Raises
+    ------
+    ModelError
+        Something in the file (a ``<compiler>`` option) gives the second model other masses than the first.
     """
     spec = mujoco.MjSpec.from_string(text)
     model = spec.compile()
@@ -46,7 +56,26 @@ def without_bar_inertia(text: str, bodies: tuple[str, ...]) -> mujoco.MjModel:
         body.iquat = [1.0, 0.0, 0.0, 0.0]
         body.fullinertia = [np.nan] * 6
         body.inertia = [LUMPED_INERTIA] * 3
-    return spec.compile()
+    lumped = spec.compile()
+    wanted = np.array(model.body_inertia)
+    wanted[[model.body(name).id for name in bodies]] = LUMPED_INERTIA
+    for array, expected in (("body_mass", np.array(model.body_mass)), ("body_inertia", wanted)):
+        found = np.asarray(getattr(lumped, array))
+        if found.shape == expected.shape:
+            off = ~np.isclose(found, expected, rtol=SAME_BODY, atol=0.0)
+            if not off.any():
+                continue
+            body = int(np.argwhere(off)[0][0])
+            said = f'body "{model.body(body).name}" has {found[body]} in it, expected {expected[body]}'
+        else:
+            said = f"{len(found)} bodies in place of {len(expected)}"
+        raise ModelError(
+            f"{file}: the model with lumped masses cannot be made, {array}: {said}; a <compiler> option of this file"
+            " (settotalmass, boundinertia, fusestatic) changes masses or inertias",
+            file=file,
+            attribute=array,
+        )
+    return lumped
 
 
 @dataclass(frozen=True)
@@ -158,13 +187,14 @@ class Engine:
                 self._idle.put(evaluator)
 
         starts = range(0, samples, BLOCK)
-        if self.threads == 1 or len(starts) == 1:
-            for first in starts:
-                one(first)
-        else:
-            # a list, so that the error of the first sample at fault is raised, whichever thread meets one first
-            for done in [self._workers().submit(one, first) for first in starts]:
-                done.result()
+        with engine_warnings():
+            if self.threads == 1 or len(starts) == 1:
+                for first in starts:
+                    one(first)
+            else:
+                # a list, so that the error of the first sample at fault is raised, whichever thread meets one first
+                for done in [self._workers().submit(one, first) for first in starts]:
+                    done.result()
 
     def _take(self) -> Evaluator:
         try:

@@ -290,7 +290,9 @@ class MujocoReference:
                         f'{self.file}: <text name="lumped_bodies"> names body "{name}"{did_you_mean(name, known)}',
                         file=self.file,
                     )
-            self._engines[mass_model] = Engine(without_bar_inertia(self._text, tuple(names.split())), self._threads)
+            self._engines[mass_model] = Engine(
+                without_bar_inertia(self._text, tuple(names.split()), self.file), self._threads
+            )
         return self._engines[mass_model]
 
     @property

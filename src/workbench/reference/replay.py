@@ -24,6 +24,7 @@ from mujoco.batch import Batch
 
 from workbench.arrays import FloatArray
 from workbench.errors import ArrayError, MotionError
+from workbench.mjcf import engine_warnings
 from workbench.reference.mujoco_reference import MujocoReference
 
 COARSE_STEPS = 1000
@@ -292,6 +293,7 @@ def _times(first: float, step: float, count: int) -> FloatArray:
     return times
 
 
+@engine_warnings()
 def near_rigid(text: str, step: float) -> mujoco.MjModel:
     """Compile an MJCF for forward simulation at a step in seconds, loops and dry friction as stiff as it allows."""
     spec = mujoco.MjSpec.from_string(text)
