@@ -124,6 +124,11 @@ def test_a_case_of_its_own_is_changed_too(tmp_path: Path) -> None:
             'method = "list"\nvary = [{ key = "speed", values = [1.0] }, { key = "speed", values = [1.0] }]',
             "varies twice",
         ),
+        (
+            'method = "list"\nvary = [{ key = "parameters.a2_left", values = [0.3] },'
+            ' { key = "parameters.a2", values = [0.3] }]',
+            'key "parameters.a2_left" has no effect: "parameters.a2" sets it too, after it',
+        ),
         ('method = "list"\nvary = [{ key = "speed", vales = [1.0] }]', 'unknown key; did you mean "values"?'),
         (
             'method = "grid"\nvary = [{ key = "speed", low = 1.0, high = 2.0, count = 2000000 }]',
@@ -136,6 +141,12 @@ def test_what_is_refused(tmp_path: Path, table: str, complaint: str) -> None:
         plan(tmp_path, table)
     assert complaint in str(error.value)
     assert str(error.value).startswith(str(tmp_path / "sweep.toml"))
+
+
+def test_a_key_of_one_side_goes_over_one_of_both(tmp_path: Path) -> None:
+    both, left = ('{ key = "parameters.a2", values = [0.3] }', '{ key = "parameters.a2_left", values = [0.31] }')
+    found = plan(tmp_path, f'method = "list"\nvary = [{both}, {left}]')
+    assert found.case_dict(0)["parameters"] == {"a2_left": 0.31, "a2_right": 0.3}
 
 
 def test_set_and_sweep_may_not_both_say_a_parameter(tmp_path: Path) -> None:

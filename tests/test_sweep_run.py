@@ -215,6 +215,48 @@ def test_only_what_changed_is_computed_again(workbench: Workbench, calm: Path) -
     assert manifest(calm)["computed"] == 10
 
 
+def test_a_model_saved_while_the_sweep_runs(
+    workbench: Workbench, calm: Path, inline: type[Inline], monkeypatch: pytest.MonkeyPatch, repository: Path
+) -> None:
+    model = workbench.directory / "robot.xml"
+    text = (repository / "models" / "asym_2rss_ppap.xml").read_text(encoding="utf-8")
+    model.write_text(text, encoding="utf-8")
+    command = ("run", "small.toml", "--out", "run", "--model", "robot.xml")
+
+    class Edited(inline):  # type: ignore[misc, valid-type]
+        def run(self, tasks: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
+            for count, (index, task) in enumerate(tasks):
+                if count == 3:
+                    os.utime(model, (0, 0))  # saved, but the same
+                if count == 5:
+                    model.write_text(text.replace('mass="0.45"', 'mass="0.46"'), encoding="utf-8")
+                yield index, self._compute(task)
+
+    monkeypatch.setattr(sweep_run, "make_pool", Edited)
+    done = workbench(*command)
+    assert done.code == 2
+    assert done.complaint == [
+        "workbench: robot.xml: was changed while the sweep ran; 5 of 10 cases, of the file as it was, are kept in run;"
+        " the same command goes on with them if the file is put back, and else starts anew"
+    ]
+    monkeypatch.setattr(sweep_run, "make_pool", inline)
+    model.write_text(text, encoding="utf-8")
+    assert workbench(*command).code == 0
+    assert manifest(workbench.directory / "run")["computed"] == 5
+    assert (
+        results(workbench.directory / "run")["summary/part-00000.parquet"]
+        == (results(calm)["summary/part-00000.parquet"])
+    )
+
+
+def test_nothing_but_cases_left_out_proves_nothing(workbench: Workbench, inline: type[Inline]) -> None:
+    nothing = FEW.replace("offset = [0.0,", "offset = [0.5,")
+    done = workbench.run(nothing, "--out", "run")
+    assert done.code == 1
+    assert "FAILED: 10 filtered, of 10 cases." in done.out
+    assert manifest(workbench.directory / "run")["status"] == "failed"
+
+
 def test_fresh_starts_over(workbench: Workbench, calm: Path) -> None:
     before = results(calm)
     assert workbench("run", "small.toml", "--out", "calm", "--fresh").code == 0

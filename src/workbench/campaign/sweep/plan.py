@@ -98,7 +98,7 @@ def plan_sweep(
         mechanism = mechanism_with(path, layered(campaign.parameters, base.parameters, settings), campaign)
     values = {name: float(value) for name, value in vars(mechanism.parameters).items()}
     case = base.model_dump()
-    changes = []
+    changes: list[Change] = []
     for vary in campaign.sweep.vary:
         if campaign.setup and vary.key.startswith("parameters."):
             raise SpecError(
@@ -113,6 +113,11 @@ def plan_sweep(
         clash = sorted(change.parameters.keys() & _stored(mechanism, settings))
         if clash:
             raise SpecError(f'{file}: sweep: key "{vary.key}": --set sets {clash[0]} in every case', key=vary.key)
+        hidden = next((c for c in changes if c.parameters and c.parameters.keys() <= change.parameters.keys()), None)
+        if hidden:
+            raise SpecError(
+                f'{file}: sweep: key "{hidden.key}" has no effect: "{change.key}" sets it too, after it', key=hidden.key
+            )
         changes.append(change)
     return Plan(Recipe(base.name[:80], case, tuple(changes)), sweep_values(campaign.sweep), mechanism, path)
 

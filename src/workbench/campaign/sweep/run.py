@@ -19,6 +19,7 @@ from workbench.campaign.spec import Campaign
 from workbench.campaign.sweep import files, state
 from workbench.campaign.sweep.evaluate import Answer, Context, Task
 from workbench.campaign.sweep.identity import case_key, common_key
+from workbench.campaign.sweep.inputs import Inputs, inputs_of
 from workbench.campaign.sweep.journal import Journal
 from workbench.campaign.sweep.plan import Plan, plan_sweep
 from workbench.campaign.sweep.progress import Meter, Show
@@ -26,7 +27,7 @@ from workbench.campaign.sweep.record import lost
 from workbench.campaign.sweep.statistics import passed, summarise
 from workbench.campaign.sweep.supervisor import Lost, Setup, Supervisor
 from workbench.campaign.user_candidates import full_names, load_candidates, with_rows
-from workbench.errors import OutputError
+from workbench.errors import OutputError, SpecError
 from workbench.staging import check_output
 
 SYNC_EVERY_S = 5.0
@@ -143,6 +144,7 @@ def run_sweep(
     users = load_candidates(names)
     campaign = with_rows(campaign, users)
     plan = plan_sweep(campaign, file, model, settings or {}, users)
+    inputs = inputs_of(campaign, file, plan.model)
     common = common_key(campaign, file, plan.model, settings or {}, effort, keep_series, users)
     context = Context(
         campaign, file.resolve(), plan.model.resolve(), dict(settings or {}), effort, plan.recipe, common, names
@@ -155,7 +157,7 @@ def run_sweep(
                 state.remove_stray_series(directory, plan, journal.__contains__)
                 done = sum(journal.counts().values())
                 (directory / store.MANIFEST).unlink(missing_ok=True)
-                computed = _compute(context, plan, journal, directory, options, show)
+                computed = _compute(context, plan, journal, directory, options, show, inputs)
                 done += computed
                 files.write_parts(directory, plan, journal)
             summary = summarise(directory, plan, campaign)
@@ -196,7 +198,13 @@ def _prepare(directory: Path, campaign: Campaign, options: SweepOptions) -> None
 
 
 def _compute(
-    context: Context, plan: Plan, journal: Journal, directory: Path, options: SweepOptions, show: Show | None
+    context: Context,
+    plan: Plan,
+    journal: Journal,
+    directory: Path,
+    options: SweepOptions,
+    show: Show | None,
+    inputs: Inputs,
 ) -> int:
     """Compute what the journal does not hold; return how many cases that was."""
     counts = journal.counts()
@@ -210,6 +218,7 @@ def _compute(
     try:
         pool = make_pool(context, options, plan.count - before)
         for index, found in pool.run(tasks):
+            _refuse_changed(inputs, plan, journal, directory)
             answer = found if isinstance(found, Answer) else _lost(context, plan, index, found)
             if answer.series is not None:
                 path = state.series_path(directory, plan, index)
@@ -233,6 +242,17 @@ def _compute(
             pool.close()
     meter.tell(force=True)
     return plan.count - before
+
+
+def _refuse_changed(inputs: Inputs, plan: Plan, journal: Journal, directory: Path) -> None:
+    path = inputs.changed()
+    if path is not None:
+        done = sum(journal.counts().values())
+        raise SpecError(
+            f"{path}: was changed while the sweep ran; {done} of {plan.count} cases, of the file as it was, are kept in"
+            f" {directory}; the same command goes on with them if the file is put back, and else starts anew",
+            file=str(path),
+        )
 
 
 def task_of(plan: Plan, index: int) -> Task:

@@ -65,7 +65,7 @@ class SweepSpec(Strict):
     """True: power balance, forward replay and raw mj_inverse for every case, as in campaigns without a sweep"""
     time_limit: Positive = 60.0
     """seconds that one case may take"""
-    memory_limit: Annotated[Finite, Field(ge=512)] = 2048.0
+    memory_limit: Annotated[Finite, Field(ge=512, le=1e9)] = 2048.0
     """megabytes of address space that a worker may take beyond its first; MuJoCo reserves more than it uses"""
     retries: Annotated[int, Field(ge=0, le=100)] = 2
     """how often a case is tried again after its worker was killed or it ran out of time"""

@@ -16,7 +16,7 @@ from workbench.campaign.spec import Campaign
 from workbench.campaign.sweep import files
 from workbench.campaign.sweep.identity import FORMAT
 from workbench.campaign.sweep.plan import Plan
-from workbench.campaign.sweep.record import GOOD, STATUSES
+from workbench.campaign.sweep.record import GOOD, PASSED, STATUSES
 from workbench.campaign.verdict import CONTRAST
 from workbench.mechanisms.parameters import stored_names
 
@@ -189,5 +189,5 @@ def _worst(pair: tuple[str, str], table: dict[str, FloatArray], plan: Plan) -> l
 
 
 def passed(counts: dict[str, int]) -> bool:
-    """Tell whether every case is passed or left out on purpose."""
-    return not any(n for status, n in counts.items() if status not in GOOD)
+    """Tell whether every case is passed or left out on purpose, and at least one is passed: none is no proof."""
+    return counts[PASSED] > 0 and not any(n for status, n in counts.items() if status not in GOOD)
