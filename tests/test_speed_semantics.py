@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -245,6 +246,35 @@ def test_friction_is_in_the_prepared_callable(robot: str) -> None:
     for i in range(4):
         assert np.array_equal(kernel(q[i], qd[i], qdd[i]), want[i])
         assert np.abs(without(q[i], qd[i], qdd[i]) - want[i]).max() > 0.1
+
+
+@both_robots
+def test_torques_may_be_written_over_an_argument(robot: str) -> None:
+    for changes in ({}, FRICTION[robot]):
+        mechanism = mechanism_of(robot, **changes)
+        kernel = mechanism.kernel()
+        state_and_force = [array[0] for array in state(mechanism, 1)] + [np.array([1.0, -2.0, 3.0])]
+        want = kernel(*state_and_force)
+        for i in range(4):
+            arguments = [array.copy() for array in state_and_force]
+            assert np.array_equal(kernel(*arguments, arguments[i]), want)
+
+
+@both_robots
+def test_complex_numbers_and_texts_are_refused(robot: str) -> None:
+    mechanism = mechanism_of(robot)
+    kernel = mechanism.kernel()
+    q, qd, qdd = (array[0] for array in state(mechanism, 1))
+    force = np.zeros(3)
+    for place, name in enumerate(("q", "qd", "qdd", "external_force")):
+        for wrong, said in ((1j, f"{name}: expected real numbers"), ("a", f"{name}: expected numbers")):
+            arguments: list[Any] = [q, qd, qdd, force]
+            arguments[place] = [wrong] * 3
+            with pytest.raises(ArrayError, match=said):
+                kernel(*arguments)
+            batch = [np.array([values]) for values in arguments[:3]]
+            with pytest.raises(ArrayError, match=said):
+                mechanism.inverse_dynamics(*batch, external_force=arguments[3])
 
 
 @both_robots

@@ -18,13 +18,22 @@ def as_rows(name: str, value: ArrayLike, columns: int = 3) -> FloatArray:
     ArrayError
         Wrong shape or not numeric.
     """
-    try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ArrayError(f"{name}: expected numbers of shape (n, {columns}), got {type(value).__name__}") from error
+    array = np.ascontiguousarray(_real(name, value, f"(n, {columns})"))
     if array.ndim != 2 or array.shape[1] != columns:
         raise ArrayError(f"{name}: expected shape (n, {columns}), got {array.shape}", argument=name, shape=array.shape)
     return array
+
+
+def _real(name: str, value: ArrayLike, shape: str) -> FloatArray:
+    try:
+        # made real, complex numbers would lose their imaginary part with no more than a warning
+        if np.iscomplexobj(value):
+            raise ArrayError(f"{name}: expected real numbers of shape {shape}, got complex ones", argument=name)
+        return np.asarray(value, dtype=np.float64)
+    except ArrayError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise ArrayError(f"{name}: expected numbers of shape {shape}, got {type(value).__name__}") from error
 
 
 def as_batch(name: str, value: ArrayLike, columns: int = 3) -> FloatArray:
@@ -92,7 +101,7 @@ def as_force(name: str, value: ArrayLike | None, samples: int) -> FloatArray:
     """
     if value is None:
         return np.zeros((samples, 3))
-    array = np.asarray(value, dtype=np.float64)
+    array = _real(name, value, f"(3,) or ({samples}, 3)")
     if array.shape == (3,):
         array = np.broadcast_to(array, (samples, 3))
     checked = as_batch(name, array)

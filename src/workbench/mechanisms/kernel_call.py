@@ -143,20 +143,22 @@ def one_sample(kernel: Any, constants: FloatArray, refuse: Refusal, friction: Fr
     ) -> FloatArray:
         tau = np.empty(3) if out is None else out
         force = still if external_force is None else external_force
+        # copies: out may be one of the arguments
+        state = None if friction is None else (_row(q), _row(qd), _row(qdd))
         try:
             done = kernel(constants, q, qd, qdd, force, tau)
         except TypeError:
             # lists, other number types, strided views
-            given = as_batches(q=_row(q), qd=_row(qd), qdd=_row(qdd), external_force=_row(force))
+            given = as_batches(q=[q], qd=[qd], qdd=[qdd], external_force=[force])
             found = np.empty(3)
             done = kernel(constants, *(array[0] for array in given), found)
             tau[:] = found
         if not done:
-            given = as_batches(q=_row(q), qd=_row(qd), qdd=_row(qdd), external_force=_row(force))
+            given = as_batches(q=[q], qd=[qd], qdd=[qdd], external_force=[force])
             as_batch("out", _row(np.zeros_like(tau)))
             refuse(*given)
-        if friction is not None:
-            tau += friction(_row(q), _row(qd), _row(qdd))[0]
+        if friction is not None and state is not None:
+            tau += friction(*state)[0]
         return tau
 
     # the first call of a compiled function looks up how to convert its arguments
