@@ -547,6 +547,15 @@ def test_a_cluster_whose_worker_is_killed_gives_the_same_bytes(workbench: Workbe
     assert "scheduler tcp://127.0.0.1:9: nobody answers" in nobody.complaint[-1]
 
 
+def test_what_is_no_address_of_a_scheduler(workbench: Workbench) -> None:
+    pytest.importorskip("distributed")
+    done = workbench.run(FEW, "--out", "run", "--scheduler", "nonsense")
+    assert done.code == 2
+    assert done.complaint == [
+        "workbench: scheduler nonsense: missing port number in address 'nonsense'; allowed: like tcp://host:8786"
+    ]
+
+
 def test_one_case_of_a_sweep_by_itself_has_the_same_numbers_and_all_evidence(workbench: Workbench) -> None:
     name = workbench.write(SWEEP)
     assert workbench("run", name, "--out", "run", "--jobs", "1").code == 0

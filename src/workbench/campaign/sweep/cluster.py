@@ -49,16 +49,23 @@ class ClusterPool:
     MissingExtraError
         Dask is not installed.
     WorkbenchError
-        Nobody answers at the address.
+        It is no address, or nobody answers at it.
     """
 
     def __init__(self, address: str, setup: Setup, time_limit: float, memory_limit: float, retries: int) -> None:
         try:
             from distributed import Client
+            from distributed.comm.addressing import parse_address, parse_host_port
         except ImportError as error:
             raise MissingExtraError(
                 "--scheduler needs the extra cluster: pip install 'parallel-robot-workbench[cluster]'"
             ) from error
+        try:  # an address without a port would leave a client behind that is neither connected nor closed
+            scheme, place = parse_address(address)
+            if scheme in ("tcp", "tls", "ws", "wss"):
+                parse_host_port(place)
+        except ValueError as error:
+            raise WorkbenchError(f"scheduler {address}: {error}; allowed: like tcp://host:8786") from error
         try:
             self._client = Client(address, timeout=PATIENCE_S, set_as_default=False)
         except (OSError, ValueError) as error:
