@@ -143,6 +143,13 @@ def test_what_is_refused(tmp_path: Path, table: str, complaint: str) -> None:
     assert str(error.value).startswith(str(tmp_path / "sweep.toml"))
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_speed_goes_over_all_of_the_motion(tmp_path: Path, order: int) -> None:
+    keys = ['{ key = "speed", values = [2.0] }', '{ key = "motion.frequency[0]", values = [3.0] }'][::order]
+    found = plan(tmp_path, f'method = "list"\nvary = [{", ".join(keys)}]')
+    assert found.case_dict(0)["motion"]["frequency"] == [6.0, 20.0, 30.0]
+
+
 def test_a_key_of_one_side_goes_over_one_of_both(tmp_path: Path) -> None:
     both, left = ('{ key = "parameters.a2", values = [0.3] }', '{ key = "parameters.a2_left", values = [0.31] }')
     found = plan(tmp_path, f'method = "list"\nvary = [{both}, {left}]')

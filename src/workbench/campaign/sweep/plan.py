@@ -12,7 +12,7 @@ from workbench.arrays import FloatArray
 from workbench.campaign.cases import layered, locate, mechanism_with, resolve_cases
 from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.sweep.samples import sweep_values
-from workbench.campaign.sweep.vary import Change, resolve_key
+from workbench.campaign.sweep.vary import SPEED, Change, resolve_key
 from workbench.campaign.user_candidates import UserCandidate
 from workbench.errors import MotionError, SpecError
 from workbench.mechanisms.base import Mechanism
@@ -35,7 +35,9 @@ class Recipe:
     def case_dict(self, index: int, numbers: tuple[float, ...]) -> dict[str, Any]:
         """Return the case as a plain dictionary, not validated."""
         case = copy.deepcopy(dict(self.case))
-        for change, number in zip(self.changes, numbers, strict=True):
+        pairs = zip(self.changes, numbers, strict=True)
+        # what else varies may be a frequency or a time, which the speed is a factor of
+        for change, number in sorted(pairs, key=lambda pair: pair[0].key == SPEED):
             change.apply(case, number)
         case["name"] = self.case_name(index)
         return case
