@@ -249,7 +249,7 @@ def test_a_worker_of_another_version_computes_nothing(workbench: Workbench, monk
     monkeypatch.setattr(sweep_run, "make_pool", tampered)
     done = workbench.run(SWEEP, "--out", "run")
     assert done.code == 2
-    assert done.complaint[-1].endswith("model, code or versions of this worker are not those of the run")
+    assert done.complaint[-1].endswith("model, formulas, code or versions of this worker are not those of the run")
 
 
 @pytest.mark.slow

@@ -207,6 +207,9 @@ def test_only_what_changed_is_computed_again(workbench: Workbench, calm: Path) -
     assert workbench.run(FEW, "--out", "calm").code == 0
     assert manifest(calm)["computed"] == 0
     # texts determine no number, a bound does
+    printed = FEW.replace("bound = 1e-9", "bound = 1e-9\nprinted_cost = { us = 6.2 }")
+    assert workbench.run(printed, "--out", "calm").code == 0
+    assert manifest(calm)["computed"] == 0
     assert workbench.run(FEW.replace("A small campaign", "Another title"), "--out", "calm").code == 0
     assert (manifest(calm)["computed"], manifest(calm)["title"]) == (0, "Another title")
     assert workbench.run(FEW.replace("1e-9", "2e-9"), "--out", "calm").code == 0

@@ -80,7 +80,7 @@ class Context:
         users = load_candidates(self.candidates)
         here = common_key(self.campaign, self.file, self.model, self.settings, self.effort, self.keep_series, users)
         if here != self.common:
-            raise WorkbenchError("model, code or versions of this worker are not those of the run")
+            raise WorkbenchError("model, formulas, code or versions of this worker are not those of the run")
         with contextlib.suppress(WorkbenchError):
             self._warm_up(users)
         return partial(evaluate, self, users)

@@ -59,7 +59,7 @@ def common_key(
             "versions": versions(),
             "model": provenance.sha256(model.read_bytes()),
             "table": table,
-            "candidates": [candidate.model_dump() for candidate in campaign.candidate],
+            "candidates": [candidate.model_dump(exclude={"printed_cost"}) for candidate in campaign.candidate],
             "parameters": campaign.parameters,
             "settings": dict(settings),
             "engines": list(effort.engines),
