@@ -164,6 +164,7 @@ class Engine:
         self._idle: queue.SimpleQueue[Evaluator] = queue.SimpleQueue()
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
+    @engine_warnings()
     def poses(self, qpos: FloatArray) -> Poses:
         """Evaluate positions of a few configurations ``(k, nq)``, k <= `BLOCK`; the result is a copy."""
         evaluator = self._take()
