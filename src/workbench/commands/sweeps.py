@@ -64,7 +64,7 @@ class SweepProgress:
             console=err, transient=True, disable=not err.is_terminal,
         )  # fmt: skip
         self._task: Any = None
-        self._said = float("-inf")
+        self._said, self._last = float("-inf"), -1
 
     def __enter__(self) -> Self:
         """Start the bar."""
@@ -83,8 +83,8 @@ class SweepProgress:
         if err.is_terminal:
             note = plain_line(found).partition("] ")[2]
             self._bar.update(self._task, completed=found.done, total=found.total, note=note)
-        elif time.monotonic() - self._said >= LINE_EVERY_S or found.done == found.total:
-            self._said = time.monotonic()
+        elif time.monotonic() - self._said >= LINE_EVERY_S or (found.done == found.total != self._last):
+            self._said, self._last = time.monotonic(), found.done
             err.print(plain_line(found), markup=False)
 
 
@@ -176,7 +176,7 @@ def print_sweep(outcome: SweepOutcome) -> None:
         listed = ", ".join(f"{d['key']} {d['rank_correlation']:+.2f}" for d in drivers)
         out.print(Text(f"Modelling error of {drivers[0]['candidate']} rises with (rank correlation): {listed}"))
     for reason in summary["reasons"]:
-        if reason["status"] != "filtered":
+        if reason["status"] != "filtered" or not summary["counts"]["passed"]:
             out.print(Text(f"{reason['status']} ({reason['cases']}): {reason['example']}"), style="yellow")
     counts = ", ".join(f"{n} {status}" for status, n in summary["counts"].items() if n)
     verdict = "PASSED" if outcome.passed else "FAILED"

@@ -27,7 +27,10 @@ def cost_table(manifest: Manifest) -> Table | None:
         rows.append(tuple(row))
     numbers = ["Here, µs", "Printed, µs", "Printed : here"]
     titles = ["Candidate", "Mass model", *(numbers if printed else numbers[:1]), *(["Source"] if printed else [])]
-    reading = "median of batches of 5,000 samples in one thread on the machine that is named above."
+    reading = (
+        "median over some calls in one thread on the machine that is named above, with 5,000 samples each; formulas"
+        " from a user's own file, with the samples of the cases."
+    )
     if printed:
         reading += (
             " The printed figures were taken by the authors, on their machine and in their language: what can be"

@@ -73,7 +73,8 @@ def verdict_section(run: SweepRun) -> Section:
             )
             for name, count in counts.items()
         ),
-        "Each case ends as exactly one of these. The run passes when every case passed or was left out.",
+        "Each case ends as exactly one of these. The run passes when every case passed or was left out, and at least"
+        " one passed.",
     )
     tested = len(run.manifest.candidates)
     about = (
