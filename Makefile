@@ -13,7 +13,7 @@ SLOW ?=
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 # Campaigns whose reports are kept in reports/published.
-PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models
+PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models design_sweep
 
 # What an interpreter must offer: uv brings its own installer, pip comes from the interpreter's ensurepip.
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
@@ -66,7 +66,7 @@ test-browser: $(STAMP) ## Run the tests that open a report in Chromium
 reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings in their heads differ
 	@for name in $(PUBLISHED); do \
 	  built=build/reports/$$name; kept=reports/published/$$name; drawn=build/pictures/$$name; \
-	  if [ ! -d $$kept/pictures ]; then \
+	  if [ ! -d $$kept/pictures ] && ! grep -q '^\[sweep\]' campaigns/$$name.toml; then \
 	    $(BIN)/workbench run campaigns/$$name.toml --quick --out $$drawn >/dev/null || exit 1; \
 	    if [ -f $$drawn/pictures/film.webp ]; then mkdir -p $$kept; cp -R $$drawn/pictures $$kept/pictures; fi; \
 	  fi; \
