@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 from matplotlib.ticker import FuncFormatter
 
@@ -27,6 +29,15 @@ from workbench.report.text import exact, pretty_unit
 
 LINEAR_FROM = 1e-4
 """Errors over cases that are all at least this large are drawn in percent from zero; smaller ones on a log axis."""
+
+ONE_SIZE = 30.0
+"""So are those of which the largest is no more than so many times the smallest."""
+
+ROUNDING = 1e-9
+"""A line of errors over cases that never rises above this is rounding."""
+
+PANEL_HEIGHT = 1.55
+"""inches"""
 
 PLATFORM = {
     "platform": ("x", "position [m]"),
@@ -60,39 +71,64 @@ def error_over_plot(run: Run, record: FigureRecord, key: str) -> Plot | str:
     names = [curve.name for text in record.curves if (curve := Curve.parse(text)) and not curve.is_reference]
     joints = [record.joint] if record.joint else list(run.manifest.joints)
     lines = [(name, joint) for name in names for joint in joints]
-    columns = 3 if len(joints) == 3 else 4
     by_line = {line: _errors_over(run, record, *line) for line in lines}
     drawn = [error for points in by_line.values() for _, error in points if math.isfinite(error)]
     if not drawn:
         return f"Not drawn: no stored error of {', '.join(names) or 'no curve'} against reference {record.reference}."
 
+    rounding = {line for line, points in by_line.items() if all(not error > ROUNDING for _, error in points)}
+    shown = [joint for joint in joints if any((name, joint) not in rounding for name in names)]
+    # a panel a joint; what is nothing but rounding would squeeze the others together and has one of its own
+    panels = [[line for line in lines if line[1] == joint and line not in rounding] for joint in shown]
+    labels = [f"{joint}, peak error" for joint in shown]
+    if rounding:
+        panels.append([line for line in lines if line in rounding])
+        labels.append("rounding")
+    columns = min(len(names), 4)
+
     def draw(figure: FigureBase) -> None:
-        (axes,) = stack(figure, [1.0], header=legend_rows(len(lines), columns), over=record.label)
-        for (name, joint), points in by_line.items():
-            turn = joints.index(joint)
-            axes.plot(
-                [x for x, _ in points],
-                [max(error, SMALLEST_DRAWN) for _, error in points],
-                color=PALETTE[names.index(name) % 6],
-                linestyle=DASHES[turn % 4],
-                marker=MARKERS[turn % 4],
-                markersize=4.5,
-                label=f"{name}, {joint}",
-            )
-        if min(drawn) >= LINEAR_FROM:
-            axes.set_ylim(0.0, 1.08 * max(drawn))
-            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.3g} %"))
-        else:
-            log_axis(axes, max(min(drawn), SMALLEST_DRAWN), max(drawn))
-        axes.set_ylabel("peak error")
-        figure_legend(figure, axes, columns)
+        header = legend_rows(len(names), columns)
+        stacked = stack(figure, [1.0] * len(shown) + [0.6] * bool(rounding), header=header, over=record.label)
+        for axes, drawn_here, label in zip(stacked, panels, labels, strict=True):
+            for name, joint in drawn_here:
+                points, turn = by_line[name, joint], names.index(name)
+                axes.plot(
+                    [x for x, _ in points],
+                    [max(error, SMALLEST_DRAWN) for _, error in points],
+                    color=PALETTE[turn % 6],
+                    linestyle=DASHES[turn % 4],
+                    marker=MARKERS[turn % 4],
+                    markersize=4.5,
+                )
+            _error_axis(axes, [error for line in drawn_here for _, error in by_line[line] if math.isfinite(error)])
+            axes.set_ylabel(label)
+        for turn, name in enumerate(names):
+            style: dict[str, Any] = {
+                "color": PALETTE[turn % 6],
+                "linestyle": DASHES[turn % 4],
+                "marker": MARKERS[turn % 4],
+            }
+            stacked[0].plot([], [], markersize=4.5, label=name, **style)
+        figure_legend(figure, stacked[0], columns)
 
     alt = (
         f"{record.title}: peak error against the {record.reference} reference over {record.label}, "
         f"for {', '.join(f'{name} on {joint}' for name, joint in lines)}; "
         f"from {exact(min(drawn), 3)} to {exact(max(drawn), 3)} of the reference's peak."
     )
-    return Plot(key, WIDE, draw, alt, record.title)
+    size = WIDE[0], 0.9 + PANEL_HEIGHT * (len(shown) + 0.6 * bool(rounding))
+    return Plot(key, size, draw, alt, record.title)
+
+
+def _error_axis(axes: Axes, errors: list[float]) -> None:
+    """Percent from zero where the errors are of one size, a log axis elsewhere."""
+    if not errors:
+        return
+    if min(errors) >= LINEAR_FROM and max(errors) <= ONE_SIZE * min(errors):
+        axes.set_ylim(0.0, 1.08 * max(errors))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.3g} %"))
+    else:
+        log_axis(axes, max(min(errors), SMALLEST_DRAWN), max(errors))
 
 
 def _errors_over(run: Run, record: FigureRecord, name: str, joint: str) -> list[tuple[float, float]]:
