@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from robots import Motion, motion_inside, peak_error, table_1
+from workbench.campaign.candidate_spec import CandidateSpec
 from workbench.campaign.evidence import Effort
 from workbench.campaign.run import Outcome, run_campaign
-from workbench.campaign.spec import CandidateSpec, load_campaign
+from workbench.campaign.spec import load_campaign
 from workbench.campaign.verdict import kind_of, verdict_of
 from workbench.errors import SpecError
 from workbench.mechanisms.asym_2rss_ppap_candidates import CANDIDATES, MISPRINT_NAMES
@@ -192,7 +193,8 @@ def test_an_error_that_is_no_number_fails_even_where_a_failure_is_declared(value
     [
         ('expect_fail = { two = ["q1"] }', 'expect_fail names case "two"'),
         ("expect_fail = { one = [] }", r"expect_fail\.one: list should have at least 1 item"),
-        ('expect_fail = "fail"', "expect_fail = 'fail': should be a valid dictionary"),
+        ("printed_cost = 6.2", "printed_cost = 6.2: should be a table with the keys us, source"),
+        ('expect_fail = "fail"', "expect_fail = 'fail': should be a table"),
         ('expect_fail = { one = ["q4"] }', 'expect_fail: no joint "q4"'),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -270,13 +271,16 @@ def test_workers_killed_at_random(workbench: Workbench, monkeypatch: pytest.Monk
 
     monkeypatch.setattr(sweep_run, "make_pool", caught)
     chance, killed, over = random.Random(jobs), [0], threading.Event()
+    moments = sorted(chance.sample(range(3, 140), 5))  # finished cases, so that a fast machine is no safer
+    journal = workbench.directory / "disturbed" / "journal.jsonl"
 
     def hunt() -> None:
-        while not over.wait(chance.uniform(0.2, 2.0)) and killed[0] < 5:
-            pids = pools[-1].pids if pools else []
-            if pids:
-                os.kill(chance.choice(pids), signal.SIGKILL)
-                killed[0] += 1
+        while not over.wait(0.005) and killed[0] < len(moments):
+            # not yet there, or no more; a process that has just ended by itself
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+                if pools and journal.read_bytes().count(b"\n") >= moments[killed[0]]:
+                    os.kill(chance.choice(pools[-1].pids), signal.SIGKILL)
+                    killed[0] += 1
 
     hunter = threading.Thread(target=hunt)
     hunter.start()

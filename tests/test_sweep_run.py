@@ -484,7 +484,8 @@ def start(name: str, out: str, *options: str) -> subprocess.Popen[bytes]:
 @pytest.mark.slow
 def test_the_runner_killed_at_twenty_random_moments(workbench: Workbench) -> None:
     chance = random.Random(5)
-    name = workbench.write(SWEEP.replace("samples = 40", "samples = 400"))
+    # enough that even a fast machine is killed while it computes, time and again
+    name = workbench.write(SWEEP.replace("samples = 40", "samples = 1500"))
     assert workbench("run", name, "--out", "calm", "--jobs", "2").code == 0
     kills = 0
     for _ in range(200):
@@ -500,6 +501,7 @@ def test_the_runner_killed_at_twenty_random_moments(workbench: Workbench) -> Non
         else:
             assert process.returncode == 0
             # finished before its time: the next one is killed while it reads all of it back
+    assert kills == 20
     done = workbench("run", name, "--out", "run", "--jobs", "4")
     assert done.code == 0, done
     assert results(workbench.directory / "run") == results(workbench.directory / "calm")
@@ -547,6 +549,7 @@ def test_a_cluster_whose_worker_is_killed_gives_the_same_bytes(workbench: Workbe
     assert results(workbench.directory / "run") == results(workbench.directory / "calm")
     nobody = workbench("run", name, "--out", "other", "--scheduler", "tcp://127.0.0.1:9")
     assert nobody.code == 2
+    assert not (workbench.directory / "other").exists()
     assert "scheduler tcp://127.0.0.1:9: nobody answers" in nobody.complaint[-1]
 
 

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.campaign.candidate_spec import CandidateSpec
 from workbench.campaign.cases import Case, at_time
 from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
-from workbench.campaign.spec import Campaign, CandidateSpec
+from workbench.campaign.spec import Campaign
 from workbench.campaign.torques import Fault, torques_of
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdict_of

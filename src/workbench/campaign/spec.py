@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
+from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
 from workbench.campaign.own_mechanism import OwnMechanism
 from workbench.campaign.schema import NAME_RULE, Finite, Name, Strict, Triple, Vector
@@ -91,39 +92,6 @@ class CsvMotion(Strict):
 
 
 Motion = Annotated[SineMotion | MultiSineMotion | CycleMotion | CsvMotion, Field(discriminator="kind")]
-
-
-class PrintedCost(Strict):
-    """What a formula's authors printed of its computing cost: microseconds per sample, beside what is measured."""
-
-    us: Annotated[Finite, Field(gt=0)]
-    source: str = ""
-
-
-class CandidateSpec(Strict):
-    """A closed form, the reference mass model it is held against, and the bound on its peak error.
-
-    Without a bound the row is a measured modelling error and has no verdict.
-    """
-
-    name: str
-    reference: str
-    bound: Annotated[Finite, Field(gt=0)] | None = None
-    expect_fail: dict[str, Annotated[list[str], Field(min_length=1)]] = Field(default_factory=dict)
-    """case -> joints whose error has to exceed the bound there; joints that are not named have to keep it"""
-    printed_cost: PrintedCost | None = None
-
-    @model_validator(mode="after")
-    def _failure_of_what(self) -> CandidateSpec:
-        if self.expect_fail and self.bound is None:
-            raise ValueError("expect_fail needs a bound that can fail")
-        return self
-
-    def in_case(self, case: CaseSpec, joint: str) -> CandidateSpec:
-        """Return the candidate with the bound that holds for a joint of a case."""
-        if self.bound is None or joint not in case.bounds:
-            return self
-        return self.model_copy(update={"bound": case.bounds[joint]})
 
 
 class ReplayWindow(Strict):
@@ -278,6 +246,10 @@ def _first(error: ValidationError, document: dict[str, Any]) -> str:
         return f"{where}.kind{_wrong_kind(issue['input'])}"
     if issue["type"] == "string_pattern_mismatch":
         return f"{where} = {shorten(repr(issue['input']))}; {NAME_RULE}"
+    if issue["type"] in ("model_type", "dict_type"):
+        section = _SECTIONS.get(str(place[-1]))
+        keys = f" with the keys {', '.join(section.model_fields)}" if section else ""
+        return f"{where} = {shorten(repr(issue['input']))}: should be a table{keys}"
     message = issue["msg"].removeprefix("Value error, ").removeprefix("Input ")
     # a whole table or list says less than its key
     shown = "" if isinstance(issue["input"], dict | list) else f" = {shorten(repr(issue['input']))}"
@@ -304,7 +276,7 @@ _MOTIONS: dict[str, type[Strict]] = {
 _TAGS = frozenset({*_MOTIONS, "float", "constrained-float"})
 _SECTIONS: dict[str, type[Strict]] = {
     "candidate": CandidateSpec, "case": CaseSpec, "claim": ClaimSpec, "figure": FigureSpec, "measure": Measure,
-    "sweep": SweepSpec, "vary": Vary, "filter": Filter,
+    "sweep": SweepSpec, "vary": Vary, "filter": Filter, "printed_cost": PrintedCost,
 }  # fmt: skip
 
 

@@ -27,8 +27,9 @@ from typing import Any
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.campaign.candidate_spec import CandidateSpec
 from workbench.campaign.schema import NAME, NAME_RULE
-from workbench.campaign.spec import Campaign, CandidateSpec
+from workbench.campaign.spec import Campaign
 from workbench.errors import CandidateError, SpecError, did_you_mean
 from workbench.mechanisms.base import Candidate, Mechanism
 from workbench.mechanisms.registration import MARK, Registration

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from workbench.campaign.spec import CandidateSpec
+from workbench.campaign.candidate_spec import CandidateSpec
 
 PASS = "pass"
 FAIL = "fail"

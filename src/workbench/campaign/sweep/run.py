@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +28,7 @@ from workbench.campaign.sweep.record import lost
 from workbench.campaign.sweep.statistics import passed, summarise
 from workbench.campaign.sweep.supervisor import Lost, Setup, Supervisor
 from workbench.campaign.user_candidates import full_names, load_candidates, with_rows
-from workbench.errors import OutputError, SpecError
+from workbench.errors import OutputError, SpecError, WorkbenchError
 from workbench.staging import check_output
 
 SYNC_EVERY_S = 5.0
@@ -150,7 +151,7 @@ def run_sweep(
         campaign, file.resolve(), plan.model.resolve(), dict(settings or {}), effort, plan.recipe, common, names
     )
     with locked(directory):
-        done = 0
+        done, new = 0, not directory.exists()
         try:
             _prepare(directory, campaign, options)
             with state.open_journal(directory, plan, common, options.retry_failed) as journal:
@@ -178,6 +179,10 @@ def run_sweep(
                 report(directory)
         except OSError as error:
             raise _refused(directory, error, done, plan.count) from error
+        except WorkbenchError:
+            if new and not state.holds_cases(directory):
+                shutil.rmtree(directory, ignore_errors=True)
+            raise
     return SweepOutcome(directory, passed(summary["counts"]), summary, manifest)
 
 

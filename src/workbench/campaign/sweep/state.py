@@ -30,6 +30,12 @@ def clear(directory: Path) -> None:
             path.unlink(missing_ok=True)
 
 
+def holds_cases(directory: Path) -> bool:
+    """Tell whether finished cases stand in a directory, be they few."""
+    journal = directory / journal_file.NAME
+    return (directory / files.CASES).exists() or (journal.exists() and journal.stat().st_size > 0)
+
+
 def repair(directory: Path) -> None:
     """Make a directory whose state is torn or missing, but that holds a sweep, one that can be gone on with.
 

@@ -1,0 +1,45 @@
+"""``[[candidate]]`` of a campaign: which formula is held against which reference, and what it has to keep."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field, model_validator
+
+from workbench.campaign.schema import Finite, Strict
+
+if TYPE_CHECKING:
+    from workbench.campaign.spec import CaseSpec
+
+
+class PrintedCost(Strict):
+    """What a formula's authors printed of its computing cost: microseconds per sample, beside what is measured."""
+
+    us: Annotated[Finite, Field(gt=0)]
+    source: str = ""
+
+
+class CandidateSpec(Strict):
+    """A closed form, the reference mass model it is held against, and the bound on its peak error.
+
+    Without a bound the row is a measured modelling error and has no verdict.
+    """
+
+    name: str
+    reference: str
+    bound: Annotated[Finite, Field(gt=0)] | None = None
+    expect_fail: dict[str, Annotated[list[str], Field(min_length=1)]] = Field(default_factory=dict)
+    """case -> joints whose error has to exceed the bound there; joints that are not named have to keep it"""
+    printed_cost: PrintedCost | None = None
+
+    @model_validator(mode="after")
+    def _failure_of_what(self) -> CandidateSpec:
+        if self.expect_fail and self.bound is None:
+            raise ValueError("expect_fail needs a bound that can fail")
+        return self
+
+    def in_case(self, case: CaseSpec, joint: str) -> CandidateSpec:
+        """Return the candidate with the bound that holds for a joint of a case."""
+        if self.bound is None or joint not in case.bounds:
+            return self
+        return self.model_copy(update={"bound": case.bounds[joint]})
