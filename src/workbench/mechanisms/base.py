@@ -121,7 +121,7 @@ class Mechanism(ABC):
             A value is not finite or outside the range that the parameter table allows.
         """
         self._parameters = parameters
-        check_parameters(self.parameter_table, dataclasses.asdict(parameters))
+        check_parameters(self.parameter_table, vars(parameters))
 
     @property
     def parameters(self) -> Any:
@@ -142,7 +142,7 @@ class Mechanism(ABC):
         ParameterError
             Unknown name, or a value that the parameter may not have.
         """
-        values = changed_parameters(type(self), dataclasses.asdict(self._parameters), changes)
+        values = changed_parameters(type(self), dict(vars(self._parameters)), changes)
         return type(self)(self.parameter_type(**values))
 
     @abstractmethod

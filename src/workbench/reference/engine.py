@@ -127,30 +127,27 @@ class Evaluator:
         flags = mujoco.mjtDisableBit
         lean = copy.copy(model)
         lean.opt.disableflags |= flags.mjDSBL_CONSTRAINT.value | flags.mjDSBL_SENSOR.value
-        self._still = Batch(lean, BLOCK, 1)
-        self._still_poses = Poses(*(self._still.bind(name) for name in POSES))
-        self.qpos: FloatArray = self._still.qpos
-        """the configurations that `place` evaluates, ``(BLOCK, nq)``, to be written into"""
-        lean = copy.copy(lean)
         lean.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
-        self._moving = Batch(lean, BLOCK, 1)
-        self._moving_poses = Poses(*(self._moving.bind(name) for name in POSES))
-        self._dynamics = Dynamics(*(self._moving.bind(name) for name in DYNAMICS))
-        self._moving_qpos, self._moving_qvel = self._moving.qpos, self._moving.qvel
+        self._batch = Batch(lean, BLOCK, 1)
+        self._poses = Poses(*(self._batch.bind(name) for name in POSES))
+        self._dynamics = Dynamics(*(self._batch.bind(name) for name in DYNAMICS))
+        self.qpos: FloatArray = self._batch.qpos
+        """the configurations that `place` evaluates, ``(BLOCK, nq)``, to be written into"""
+        self._qvel = self._batch.qvel
         self._all = np.arange(BLOCK, dtype=np.int32)
 
     def place(self, ids: np.ndarray) -> Poses:
         """Evaluate positions of the listed rows of `qpos`; the arrays are valid until the next call."""
-        self._still.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
-        return self._still_poses
+        self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
+        return self._poses
 
     def move(self, qpos: FloatArray, qvel: FloatArray) -> tuple[Poses, Dynamics]:
         """Evaluate states ``(k, nq)``, ``(k, nv)``, k <= `BLOCK`; the arrays are valid until the next call."""
         count = len(qpos)
-        self._moving_qpos[:count] = qpos
-        self._moving_qvel[:count] = qvel
-        self._moving.forward(self._all[:count], stage=mujoco.mjtStage.mjSTAGE_VEL.value)
-        return self._moving_poses, self._dynamics
+        self.qpos[:count] = qpos
+        self._qvel[:count] = qvel
+        self._batch.forward(self._all[:count], stage=mujoco.mjtStage.mjSTAGE_VEL.value)
+        return self._poses, self._dynamics
 
 
 class Engine:
