@@ -19,7 +19,7 @@ import pandas as pd
 from workbench.campaign.cases import Case, layered, resolve_case
 from workbench.campaign.compare import CaseResult, Row, compute_case
 from workbench.campaign.evidence import Effort
-from workbench.campaign.spec import Campaign
+from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.sweep.identity import case_key, common_key
 from workbench.campaign.sweep.plan import Recipe
 from workbench.campaign.sweep.record import FAILED, FILTERED, INVALID, PASSED, Record, lost
@@ -109,7 +109,7 @@ def evaluate(context: Context, users: Sequence[UserCandidate], task: Task) -> An
     key = case_key(context.common, content)
     filters = context.campaign.sweep.filter if context.campaign.sweep else None
     try:
-        spec = context.recipe.case_spec(index, numbers)
+        spec = CaseSpec.model_validate(content)
         overrides = layered(context.campaign.parameters, spec.parameters, context.settings)
         try:
             case = resolve_case(context.campaign, spec, context.file, context.model, overrides, users)
