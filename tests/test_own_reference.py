@@ -83,6 +83,34 @@ def test_a_parallelogram_driven_at_both_cranks_shares_the_load_evenly(tmp_path: 
     assert np.abs(tau[:, 0] - expected).max() < 1e-12
 
 
+ROD = '<geom type="capsule" fromto="0 0 0 .5 0 0" size=".01" mass=".5"/>'
+RSSR = f"""<mujoco><compiler angle="radian"/><option><flag contact="disable"/></option><worldbody>
+ <body name="crank"><joint name="crank"/><geom type="capsule" fromto="0 0 0 .1 0 0" size=".01" mass=".3"/>
+  <body name="rod" pos=".1 0 0"><joint name="ball" type="ball"/>{ROD}<site name="far" pos=".5 0 0"/></body></body>
+ <body pos=".6 0 -.3"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 .3" size=".01" mass=".4"/>
+  <site name="coupler" pos="0 0 .3"/></body>
+</worldbody><equality><connect site1="far" site2="coupler"/></equality></mujoco>"""
+"""A spatial four-bar whose rod may spin about its own axis."""
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        ('<geom pos=".25 0 .2" size=".02" mass=".5"/>', "its mass centre lies 0.1 m off the line"),
+        ('<geom type="box" pos=".25 0 0" size=".02 .02 .1" mass=".5"/>', "moments of inertia differ around the line"),
+    ],
+)
+def test_a_rod_that_gravity_or_inertia_would_spin_is_refused(tmp_path: Path, extra: str, message: str) -> None:
+    assert reference(tmp_path, RSSR, ("crank",)).mobility().idle_freedoms == 1
+    with pytest.raises(ModelError, match=message):
+        reference(tmp_path, RSSR.replace(ROD, ROD + extra), ("crank",))
+
+
+def test_a_rod_closed_at_its_own_ball_joint_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="place the site at the rod's other end"):
+        reference(tmp_path, RSSR.replace('name="far" pos=".5 0 0"', 'name="far"'), ("crank",))
+
+
 REFUSED = {
     "unactuated freedom": (
         FOURBAR.replace('name="tip" pos="0.3 0 0"/>', 'name="off" pos="0.3 0 0"/>').replace(
@@ -109,6 +137,26 @@ REFUSED = {
         FOURBAR.replace('name="elbow"', 'name="elbow" stiffness="3"'),
         Setup(("crank",), "coupler", initial=GUESS),
         "springs are not covered",
+    ),
+    "springs without a linear term": (
+        FOURBAR.replace('name="elbow"', 'name="elbow" stiffness="0 5 3"'),
+        Setup(("crank",), "coupler", initial=GUESS),
+        "has stiffness 0 5 3; springs are not covered",
+    ),
+    "gravity compensation": (
+        FOURBAR.replace('<body name="coupler"', '<body name="coupler" gravcomp="1"'),
+        Setup(("crank",), "coupler", initial=GUESS),
+        'body "coupler" has gravcomp 1',
+    ),
+    "fluid": (
+        FOURBAR.replace("<option>", '<option viscosity="0.1">'),
+        Setup(("crank",), "coupler", initial=GUESS),
+        "<option viscosity> is 0.1",
+    ),
+    "loops switched off": (
+        FOURBAR.replace("<flag ", '<flag equality="disable" '),
+        Setup(("crank",), "coupler", initial=GUESS),
+        "<flag equality> is disabled",
     ),
     "contacts": (
         FOURBAR.replace('<option><flag contact="disable"/></option>', ""),

@@ -176,8 +176,8 @@ FOUR_BAR = f"""<site name="ground" pos="0 1 0"/><body name="arm"><joint name="q"
     <site name="P" pos="0 0 .5"/><body pos="0 0 .5"><joint axis="1 0 0"/>{INERTIAL}
     <body pos="0 1 0"><joint axis="1 0 0"/>{INERTIAL}<site name="foot" pos="0 0 -.5"/></body></body></body>"""
 CRANK_SLIDER = f"""<body name="arm"><joint name="q" axis="1 0 0" damping="0.3"/>{INERTIAL}<site name="P" pos="0 0 .2"/>
-    <body name="rod" pos="0 0 0.2"><joint name="ball" type="ball" damping="0.2" armature="0.01"/>{INERTIAL}
-    <site name="end" pos="0 0.5 0"/></body></body>
+    <body name="rod" pos="0 0 0.2"><joint name="ball" type="ball" damping="0.2" armature="0.01"/>
+    <inertial pos="0 0.2 0" mass="1" diaginertia="0.02 0.001 0.02"/><site name="end" pos="0 0.5 0"/></body></body>
     <body name="slider" pos="0 0.5 0.2"><joint name="s" type="slide" axis="0 1 0"/>{INERTIAL}
     <site name="pin"/></body>"""
 COUPLED = f"""<body name="arm"><joint name="q" axis="0 1 0"/>{INERTIAL}<body name="outer" pos="1 0 0">

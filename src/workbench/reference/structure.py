@@ -14,11 +14,16 @@ from numpy.polynomial import Polynomial
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError
 from workbench.mjcf import custom_text
+from workbench.mjcf_values import inertia_matrix
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 CONNECT, WELD, JOINT, SPIN = 0, 1, 2, 3
 """Kinds of constraint blocks; SPIN says that a rod between two spherical joints does not turn about its own axis."""
+
+LOPSIDED = 1e-6
+"""Of a rod's length and of its inertia: how unlike a body of revolution a rod with an idle spin may be; six digits in a
+file stay below it."""
 
 ROWS = {CONNECT: 3, WELD: 6, JOINT: 1, SPIN: 1}
 
@@ -90,6 +95,8 @@ def read_structure(model: mujoco.MjModel, file: str) -> Structure:
             moves[body, first : first + model.body_dofnum[body]] = True
     blocks, names, polynomials = _closures(model, file)
     idle = _idle_rods(model, blocks)
+    for body, site in idle:
+        _refuse_lopsided(model, body, site, file)
     for body, site in idle:
         blocks.append((SPIN, body, 0, site, int(model.body_jntadr[body])))
         names.append(f"spin of {_name(model, obj.mjOBJ_BODY, body)}")
@@ -186,6 +193,46 @@ def _idle_rods(model: mujoco.MjModel, blocks: list[tuple[int, int, int, int, int
     return rods
 
 
+def _refuse_lopsided(model: mujoco.MjModel, body: int, site: int, file: str) -> None:
+    """Refuse a rod whose mass is not alike all around its axis: its spin is not idle, and no actuator holds it."""
+    joint = int(model.body_jntadr[body])
+    along = np.array(model.site_pos[site]) - model.jnt_pos[joint]
+    length = float(np.linalg.norm(along))
+    name = _name(model, mujoco.mjtObj.mjOBJ_BODY, body)
+    remedy = (
+        f'what spins it no actuator holds; put two hinges in place of ball joint "'
+        f'{_name(model, mujoco.mjtObj.mjOBJ_JOINT, joint)}", or make the rod alike all around'
+    )
+    if not length:
+        end = _name(model, mujoco.mjtObj.mjOBJ_SITE, site)
+        raise ModelError(
+            f'{file}: body "{name}" is closed by site "{end}", which lies in the centre of its ball joint; place the site'
+            " at the rod's other end",
+            file=file,
+            element=name,
+        )
+    axis = along / length
+    off = float(np.linalg.norm(np.cross(axis, model.body_ipos[body] - model.jnt_pos[joint])))
+    if off > LOPSIDED * length:
+        raise ModelError(
+            f'{file}: body "{name}" hangs between two spherical joints, and its mass centre lies {off:.3g} m off the'
+            f" line between them; {remedy}",
+            file=file,
+            element=name,
+        )
+    inertia = inertia_matrix(model, body)
+    across = np.linalg.svd(axis[None, :])[2][1:]
+    seen = np.vstack([axis, across]) @ inertia @ np.vstack([axis, across]).T
+    uneven = float(max(abs(seen[0, 1]), abs(seen[0, 2]), abs(seen[1, 2]), abs(seen[1, 1] - seen[2, 2])))
+    if uneven > LOPSIDED * float(np.trace(inertia)):
+        raise ModelError(
+            f'{file}: body "{name}" hangs between two spherical joints, and its moments of inertia differ around the'
+            f" line between them by {uneven:.3g} kg m^2; {remedy}",
+            file=file,
+            element=name,
+        )
+
+
 def _refuse_uncovered_friction(model: mujoco.MjModel, file: str) -> None:
     """Refuse dry friction of passive joints, damping that is not linear, and friction that MuJoCo is told to ignore."""
     driven = {int(joint) for joint in model.actuator_trnid[:, 0]}
@@ -228,10 +275,29 @@ def _refuse_uncovered(model: mujoco.MjModel, file: str) -> None:
     obj = mujoco.mjtObj
     if model.ntendon:
         raise ModelError(f"{file}: {model.ntendon} tendon(s); none is covered", file=file)
-    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY.value:
+    if _off(model, "gravity"):
         raise ModelError(f"{file}: <flag gravity> is disabled; set gravity to zero by the parameter g", file=file)
-    contacts_off = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT.value)
-    if not contacts_off and np.any(model.geom_contype | model.geom_conaffinity):
+    for flag in ("constraint", "equality"):
+        if model.neq and _off(model, flag):
+            raise ModelError(
+                f"{file}: <flag {flag}> is disabled, so that the file's loops are open; enable it, or take the"
+                " equalities out",
+                file=file,
+            )
+    for option in ("density", "viscosity"):
+        value = float(getattr(model.opt, option))
+        if value:
+            raise ModelError(
+                f"{file}: <option {option}> is {value:g}; forces of a surrounding fluid are not covered", file=file
+            )
+    if model.body_gravcomp.any():
+        body = int(np.argmax(model.body_gravcomp != 0))
+        raise ModelError(
+            f'{file}: body "{_name(model, obj.mjOBJ_BODY, body)}" has gravcomp {model.body_gravcomp[body]:g}; gravity'
+            " compensation is not covered",
+            file=file,
+        )
+    if not _off(model, "contact") and np.any(model.geom_contype | model.geom_conaffinity):
         geom = int(np.argmax(model.geom_contype | model.geom_conaffinity))
         raise ModelError(
             f'{file}: geom "{_name(model, obj.mjOBJ_GEOM, geom)}" can collide; contacts are not covered, disable them'
@@ -241,15 +307,21 @@ def _refuse_uncovered(model: mujoco.MjModel, file: str) -> None:
     for joint in range(model.njnt):
         name = _name(model, obj.mjOBJ_JOINT, joint)
         if mujoco.mjtJoint(model.jnt_type[joint]) == mujoco.mjtJoint.mjJNT_FREE:
-            raise ModelError(f'{file}: joint "{name}" is free; hang the mechanism on one fixed base body', file=file)
+            raise ModelError(
+                f'{file}: joint "{name}" is free; fix the body if it is the base; if it is the platform, give it three'
+                " slides and a ball in place of the free joint",
+                file=file,
+                joint=name,
+            )
         if model.jnt_limited[joint] and not _off(model, "limit"):
             raise ModelError(
                 f'{file}: joint "{name}" has a range {model.jnt_range[joint].tolist()}; limits are not covered',
                 file=file,
             )
-        if model.jnt_stiffness[joint] and not _off(model, "spring"):
-            value = float(model.jnt_stiffness[joint])
-            raise ModelError(f'{file}: joint "{name}" has stiffness {value:g}; springs are not covered', file=file)
+        stiffness = np.array([model.jnt_stiffness[joint], *model.jnt_stiffnesspoly[joint]])
+        if stiffness.any() and not _off(model, "spring"):
+            shown = " ".join(f"{number:g}" for number in np.trim_zeros(stiffness, "b"))
+            raise ModelError(f'{file}: joint "{name}" has stiffness {shown}; springs are not covered', file=file)
     _refuse_uncovered_friction(model, file)
     for actuator in range(model.nu):
         name = _name(model, obj.mjOBJ_ACTUATOR, actuator)
