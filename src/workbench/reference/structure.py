@@ -206,8 +206,8 @@ def _refuse_lopsided(model: mujoco.MjModel, body: int, site: int, file: str) -> 
     if not length:
         end = _name(model, mujoco.mjtObj.mjOBJ_SITE, site)
         raise ModelError(
-            f'{file}: body "{name}" is closed by site "{end}", which lies in the centre of its ball joint; place the site'
-            " at the rod's other end",
+            f'{file}: body "{name}" is closed by site "{end}", which lies in the centre of its ball joint; place the'
+            " site at the rod's other end",
             file=file,
             element=name,
         )
