@@ -156,7 +156,9 @@ def test_power_balance_keeps_the_peaks_and_names_the_worst_sample(asym: wb.Mujoc
 def test_power_balance_at_rest_and_with_nan(asym: wb.MujocoReference) -> None:
     pose = np.array([SIMULATION_1[0]])
     still = np.zeros((1, 3))
-    assert power_balance(asym, pose, still, still).relative == 0.0
+    at_rest = power_balance(asym, pose, still, still)
+    assert at_rest.peak_power == 0.0
+    assert np.isnan(at_rest.relative), "a balance of nothing is no evidence of an uncertainty of zero"
     motion = at(SIMULATION_1)(np.linspace(0.1, 1.0, 20))
     balance = power_balance(asym, *motion, tau=np.full((20, 3), np.nan))
     assert not balance.relative <= 1.0

@@ -63,7 +63,8 @@ class PowerBalance:
     peak_power: float
     """max |tau . qd| over all n samples, the normaliser, W"""
     relative: float
-    """max |residual| / peak_power; NaN in the torques gives NaN, which satisfies no bound"""
+    """max |residual| / peak_power; NaN where the torques hold NaN and where nothing moves: a balance of nothing judges
+    nothing, and NaN satisfies no bound"""
     worst_sample: int
     """index into the n samples of the largest |residual|"""
     differentiation: float
@@ -219,5 +220,5 @@ def _difference(
 
 def _ratio(numerator: float, denominator: float) -> float:
     if denominator == 0.0:
-        return 0.0 if numerator == 0.0 else float("inf")
+        return float("nan") if numerator == 0.0 else float("inf")
     return numerator / denominator
