@@ -215,6 +215,7 @@ SPEC = {
         ('actuated = ["crank"]\nplatform_site = "coupler"\n', ""),
         "initial goes with actuated and platform_site",
     ),
+    "parameter that no formula can name": (("m1 =", "lambda ="), 'lambda = "mass crank": formulas read p.NAME'),
     "unknown quantity": (('"mass crank"', '"mas crank"'), 'm1 = "mas crank": unknown quantity; did you mean "mass"?'),
     "unknown body": (('"mass crank"', '"mass crnk"'), 'no body "crnk"; did you mean "crank"?'),
     "form": (('"offset coupler x"', '"offset coupler"'), 'allowed: "offset BODY x|y|z"'),

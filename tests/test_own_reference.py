@@ -158,6 +158,11 @@ REFUSED = {
         Setup(("crank",), "coupler", initial=GUESS),
         "<flag equality> is disabled",
     ),
+    "no freedom": (
+        FOURBAR.replace("</equality>", '<joint joint1="elbow" joint2="crank"/></equality>'),
+        Setup(("crank",), "coupler", initial=GUESS),
+        "the loops leave no freedom, so that crank cannot move",
+    ),
     "contacts": (
         FOURBAR.replace('<option><flag contact="disable"/></option>', ""),
         Setup(("crank",), "coupler", initial=GUESS),

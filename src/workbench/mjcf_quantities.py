@@ -6,6 +6,7 @@ compiled, never from the text.
 
 from __future__ import annotations
 
+import keyword
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -109,6 +110,12 @@ def read_quantities(model: mujoco.MjModel, asked: dict[str, str]) -> dict[str, Q
 def _read(model: mujoco.MjModel, data: mujoco.MjData, name: str, text: str) -> Quantity:
     words = text.split()
     where = f'read: {name} = "{text}"'
+    if not name.isidentifier() or keyword.iskeyword(name) or name.startswith("__"):
+        raise SpecError(
+            f"{where}: formulas read p.NAME, and this name cannot stand there; allowed: letters, digits and _, none"
+            ' of the words of Python, such as "lambda"',
+            key=name,
+        )
     if not words or words[0] not in KINDS:
         raise SpecError(f"{where}: unknown quantity{did_you_mean(words[0] if words else '', KINDS)}", key=name)
     kind = KINDS[words[0]]

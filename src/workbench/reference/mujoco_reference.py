@@ -320,6 +320,12 @@ class MujocoReference:
         """Every passive freedom must follow from the actuated ones; there may be more actuators than needed."""
         structure, home = self._structure, self._home_jacobian()
         check_freedoms(structure, home, self._closer.jacobian_near_home)
+        if not self.mobility().mobility:
+            raise ModelError(
+                f"{self.file}: the loops leave no freedom, so that {', '.join(structure.joint_names)} cannot move;"
+                " take an equality out, or add a joint",
+                file=self.file,
+            )
         if excess_actuators(home, structure.passive, structure.actuated):
             columns, tables = leading(structure, home)
             self._leader = self._led_by(dataclasses.replace(tables, home_qpos=self._closer.home)), columns
