@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from own_mechanisms import FOURBAR, PARALLELOGRAM
+from workbench.campaign.generic import generic_mechanism
 from workbench.errors import ModelError, MotionError, WorkbenchError
 from workbench.mjcf_setup import Setup
 from workbench.reference import MujocoReference
@@ -104,6 +105,16 @@ def test_a_rod_that_gravity_or_inertia_would_spin_is_refused(tmp_path: Path, ext
     assert reference(tmp_path, RSSR, ("crank",)).mobility().idle_freedoms == 1
     with pytest.raises(ModelError, match=message):
         reference(tmp_path, RSSR.replace(ROD, ROD + extra), ("crank",))
+
+
+@pytest.mark.parametrize(("attribute", "warned"), [("damping", True), ("armature", True), ("pos", False)])
+def test_what_would_spin_a_rod_is_warned_of(tmp_path: Path, attribute: str, warned: bool) -> None:
+    value = "0 0 0" if attribute == "pos" else "0.1"
+    path = tmp_path / "model.xml"
+    path.write_text(RSSR.replace('type="ball"', f'type="ball" {attribute}="{value}"'))
+    mechanism = generic_mechanism(path, Setup(("crank",), "coupler"))
+    warnings = mechanism.warnings(np.zeros(1), np.zeros((1, 1)))
+    assert [text.split(":")[0] for text in warnings] == (["rod rod"] if warned else [])
 
 
 def test_a_rod_closed_at_its_own_ball_joint_is_refused(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from workbench.mechanisms.parameters import ParameterInfo
 from workbench.mjcf_quantities import read_quantities
 from workbench.mjcf_setup import Setup
 from workbench.reference import MujocoReference
+from workbench.reference.structure import SPIN
 
 DEGREES = 4.0 * np.pi
 """A hinge that moves through more than two turns was most likely given in degrees."""
@@ -143,6 +144,15 @@ class GenericMechanism(Mechanism):
                 " are those of least norm, newtons and newton-metres counted alike; no second engine looks at"
                 " them, and reactions are left out"
             )
+        structure, model = self.reference.structure, self.reference.compiled()
+        spinning = structure.blocks[structure.blocks[:, 0] == SPIN, 1]
+        for name, body in zip(structure.idle, spinning, strict=True):
+            dofs = slice(model.body_dofadr[body], model.body_dofadr[body] + 3)
+            if model.dof_damping[dofs].any() or model.dof_armature[dofs].any():
+                found.append(
+                    f"rod {name}: damping or armature of its ball joint would spin it about its own axis; the reference"
+                    " holds that spin at zero, by a moment that no actuator gives"
+                )
         return found
 
 
