@@ -269,3 +269,9 @@ def test_model_check_of_an_own_mechanism_takes_what_the_campaign_says(workbench:
     loose = workbench("model", "check", open_loop, "--campaign", campaign)
     assert loose.code == 1
     assert "mobility 3, but 1 actuators" in loose.out
+    lock = '<joint joint1="elbow" joint2="crank" polycoef="-1.5 1 0 0 0"/></equality>'
+    locked = workbench(
+        "model", "check", workbench.write(FOURBAR.replace("</equality>", lock), "locked.xml"), "--campaign", campaign
+    )
+    assert locked.code == 1
+    assert "the loops leave no freedom" in locked.out

@@ -189,6 +189,8 @@ class _Closed:
         mobility, active = self.mobility().mobility, len(self.structure.actuated)
         if mobility > active or (self.loaded.kind is not None and self.excess):
             found.append(f"{self.loaded.file}: mobility {mobility}, but {active} actuators; each freedom needs one")
+        elif not mobility:
+            found.append(f"{self.loaded.file}: the loops leave no freedom; take an equality out, or add a joint")
         return found
 
     def platform(self, qpos: FloatArray) -> FloatArray:
