@@ -332,7 +332,12 @@ def test_a_machine_that_cannot_draw_says_so_and_fails_no_run(
     assert [path.name for path in (drawing.directory / "run" / "pictures").iterdir()] == ["pictures.json"]
 
 
-def test_a_drawing_that_hangs_is_left_behind(drawing: Workbench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_drawing_that_hangs_is_left_behind(
+    drawing: Workbench, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    # a directory of its own: other tests draw at the same time
+    temporary = tmp_path_factory.mktemp("temporary")
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     monkeypatch.setattr(run_pictures, "needs", lambda *modules: None)
     monkeypatch.setattr(run_pictures, "PATIENCE_S", 0.2)
     started: list[subprocess.Popen[bytes]] = []
@@ -342,9 +347,8 @@ def test_a_drawing_that_hangs_is_left_behind(drawing: Workbench, monkeypatch: py
         return started[-1]
 
     monkeypatch.setattr(run_pictures, "popen", hang)
-    before = set(Path(tempfile.gettempdir()).glob("workbench_*"))
     done = drawing.run(SMALL, "--quick", "--out", "run")
     assert (done.code, done.complaint) == (0, [])
     assert record_of(drawing, "run")["note"] == "drawing took longer than 0.2 s"
     assert [process.wait(20) for process in started] == [-signal.SIGKILL]
-    assert set(Path(tempfile.gettempdir()).glob("workbench_*")) <= before
+    assert not list(temporary.iterdir())
