@@ -9,15 +9,14 @@ from typing import Annotated
 import typer
 
 from workbench.commands.assignments import settings
+from workbench.commands.options import CampaignArgument, OtherModel, SetInCases
 from workbench.errors import SpecError
 
 BOUND_FAILED = 1
 
 
 def run(
-    campaign: Annotated[
-        Path, typer.Argument(metavar="CAMPAIGN", help="Campaign file (TOML), or the name of one that comes along.")
-    ],
+    campaign: CampaignArgument,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -28,13 +27,8 @@ def run(
     only: Annotated[
         list[str] | None, typer.Option(metavar="CASE", help="Run this case only, of a sweep too; may be repeated.")
     ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI; a2*=1.1 scales."),
-    ] = None,
-    model: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="MJCF file in place of the campaign's own.")
-    ] = None,
+    set_: SetInCases = None,
+    model: OtherModel = None,
     candidates: Annotated[
         list[str] | None,
         typer.Option(metavar="FILE", help="Python file with formulas of your own, which is run; may be repeated."),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from workbench.commands.assignments import settings
+from workbench.commands.options import CampaignArgument, OtherModel, SetInCases
 
 if TYPE_CHECKING:
     from workbench.campaign.rerun import Errors, Stamp
@@ -29,17 +30,10 @@ WORSE_SHOWN = 6
 
 
 def watch(
-    campaign: Annotated[
-        Path, typer.Argument(metavar="CAMPAIGN", help="Campaign file (TOML), or the name of one that comes along.")
-    ],
+    campaign: CampaignArgument,
     only: Annotated[list[str] | None, typer.Option(metavar="CASE", help="Run this case only; may be repeated.")] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI; a2*=1.1 scales."),
-    ] = None,
-    model: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="MJCF file in place of the campaign's own.")
-    ] = None,
+    set_: SetInCases = None,
+    model: OtherModel = None,
     candidates: Annotated[
         list[str] | None,
         typer.Option(metavar="FILE", help="Python file with formulas of your own, run at every save; may be repeated."),
