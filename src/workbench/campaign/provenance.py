@@ -36,6 +36,18 @@ def machine() -> dict[str, str | int]:
     }
 
 
+def stamp(path: Path) -> tuple[int, int, int]:
+    """What changes when a file is saved, over the old one or in its place: modification time, size and inode.
+
+    Raises
+    ------
+    OSError
+        There is no such file, or it may not be looked at.
+    """
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size, status.st_ino
+
+
 def git_commit(directory: Path) -> str | None:
     """Commit of the checkout that holds *directory*, with ``+`` where it has uncommitted changes; None outside one."""
 

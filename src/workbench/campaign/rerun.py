@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from workbench.campaign import provenance
 from workbench.campaign.cases import locate, resolve_cases
 from workbench.campaign.compare import Row
 from workbench.campaign.evidence import Effort
@@ -93,7 +94,6 @@ def stamps(files: Sequence[Path]) -> dict[Path, Stamp]:
 
 def _stamp(file: Path) -> Stamp:
     try:
-        status = file.stat()
+        return provenance.stamp(file)
     except OSError:
         return None
-    return status.st_mtime_ns, status.st_size, status.st_ino

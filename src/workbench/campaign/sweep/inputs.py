@@ -31,7 +31,7 @@ class Inputs:
         """Return a file whose content is another one now, or None. Looks at the content only where it was written."""
         for path, seen in self._seen.items():
             try:
-                if _stamp(path) == seen.stamp:
+                if provenance.stamp(path) == seen.stamp:
                     continue
                 now = _look(path)
             except OSError:
@@ -42,14 +42,9 @@ class Inputs:
         return None
 
 
-def _stamp(path: Path) -> tuple[int, ...]:
-    status = path.stat()
-    return status.st_mtime_ns, status.st_size, status.st_ino
-
-
 def _look(path: Path) -> _Seen:
     # the stamp first: what is written after it has another one
-    return _Seen(_stamp(path), provenance.sha256(path.read_bytes()))
+    return _Seen(provenance.stamp(path), provenance.sha256(path.read_bytes()))
 
 
 def inputs_of(campaign: Campaign, file: Path, model: Path) -> Inputs:
