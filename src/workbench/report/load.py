@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pyarrow
@@ -18,7 +19,7 @@ from pydantic import ValidationError
 
 from workbench.arrays import FloatArray
 from workbench.errors import OutputError
-from workbench.report.manifest import FORMAT_VERSION, Manifest
+from workbench.report.manifest import FORMAT_VERSION, Manifest, Record
 
 UNFINISHED = "journal.jsonl"
 """Holds the cases of a sweep while it runs, or after it was stopped."""
@@ -161,6 +162,33 @@ def read_text(path: Path) -> str:
         raise OutputError(f"{path}: cannot be read ({short(error)})") from error
 
 
+RecordType = TypeVar("RecordType", bound=Record)
+
+
+def read_record(path: Path, kind: type[RecordType], version: int) -> RecordType:
+    """Read a JSON file of a run directory.
+
+    Raises
+    ------
+    OutputError
+        One line that names the file, the key and the value: missing, torn, of another format, or a wrong entry.
+    """
+    try:
+        data = json.loads(read_text(path))
+    except ValueError as error:
+        raise OutputError(f"{path}: not valid JSON ({short(error)})") from error
+    found = data.get("format") if isinstance(data, dict) else None
+    if found != version:
+        raise OutputError(f"{path}: format {found!r} is not supported; allowed: {version}", key="format")
+    try:
+        return kind.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in first["loc"])
+        value = "" if first["type"] == "missing" else f", got {str(first['input'])[:60]!r}"
+        raise OutputError(f"{path}: key {key!r}: {first['msg']}{value}", key=key) from error
+
+
 def read_manifest(directory: Path) -> Manifest:
     """Read manifest.json of a run directory, with a sweep or without.
 
@@ -175,21 +203,7 @@ def read_manifest(directory: Path) -> Manifest:
             f"{directory}: holds a sweep that is not finished; the same workbench run command goes on with it, and "
             "writes the report at the end"
         )
-    text = read_text(path)
-    try:
-        data = json.loads(text)
-    except ValueError as error:
-        raise OutputError(f"{path}: not valid JSON ({short(error)})") from error
-    version = data.get("format") if isinstance(data, dict) else None
-    if version != FORMAT_VERSION:
-        raise OutputError(f"{path}: format {version!r} is not supported; allowed: {FORMAT_VERSION}", key="format")
-    try:
-        manifest = Manifest.model_validate(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(str(part) for part in first["loc"])
-        value = "" if first["type"] == "missing" else f", got {str(first['input'])[:60]!r}"
-        raise OutputError(f"{path}: key {key!r}: {first['msg']}{value}", key=key) from error
+    manifest = read_record(path, Manifest, FORMAT_VERSION)
     count = len(manifest.joints)
     for key in ("coordinate_units", "force_units"):
         if len(getattr(manifest, key)) != count:

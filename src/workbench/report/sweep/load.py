@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,11 +11,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from workbench.arrays import FloatArray
 from workbench.errors import OutputError
-from workbench.report.load import read_text, short
+from workbench.report.load import read_record, short
 from workbench.report.manifest import Manifest
 from workbench.report.sweep.summary import FORMAT_VERSION, KeyRecord, Summary
 
@@ -101,19 +99,7 @@ def load_sweep(directory: Path, manifest: Manifest) -> SweepRun:
 
 
 def _read_summary(path: Path) -> Summary:
-    try:
-        data = json.loads(read_text(path))
-    except ValueError as error:
-        raise OutputError(f"{path}: not valid JSON ({short(error)})") from error
-    version = data.get("format") if isinstance(data, dict) else None
-    if version != FORMAT_VERSION:
-        raise OutputError(f"{path}: format {version!r} is not supported; allowed: {FORMAT_VERSION}", key="format")
-    try:
-        summary = Summary.model_validate(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise OutputError(f"{path}: key {key!r}: {first['msg']}", key=key) from error
+    summary = read_record(path, Summary, FORMAT_VERSION)
     if not summary.keys:
         raise OutputError(f"{path}: key 'keys': nothing varies; allowed: at least one", key="keys")
     return summary
