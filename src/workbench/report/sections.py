@@ -190,6 +190,12 @@ def reproduce_section(manifest: Manifest) -> Section:
     )
 
 
+NO_REAL_ROBOT = (
+    "This verifies formulas against a simulator. It does not validate either against a real robot: friction, "
+    "clearance, elasticity and everything else that the model leaves out is left out on both sides."
+)
+
+
 def limits_section(run: Run) -> Section:
     """Say what the numbers do not prove."""
     records = [record for record in run.manifest.cases.values() if record.closure_residual is not None]
@@ -197,9 +203,7 @@ def limits_section(run: Run) -> Section:
     warned = sum(len(record.warnings) for record in run.manifest.cases.values())
     broken = sum(record.status in NOT_COMPUTED for record in run.manifest.cases.values())
     points = [
-        "This verifies formulas against a simulator. It does not validate either against a real robot: friction, "
-        "clearance, "
-        "elasticity and everything else that the model leaves out is left out on both sides.",
+        NO_REAL_ROBOT,
         "Both sides read their parameters from the same model file, so a wrong mass in that file is invisible here.",
         "The reference is a numerical calculation of its own: "
         + (

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from workbench.report.section import Section
-from workbench.report.sections import parameters_section, reproduce_section
+from workbench.report.sections import NO_REAL_ROBOT, parameters_section, reproduce_section
 from workbench.report.sweep.cases import trouble_section, worst_section
 from workbench.report.sweep.drivers import drivers_section
 from workbench.report.sweep.errors import errors_section
@@ -51,8 +51,7 @@ def _limits_section(run: SweepRun) -> Section:
     known = max((int(np.isfinite(errors).sum()) for errors in run.worst.values()), default=0)
     lost = sum(count for name, count in run.summary.counts.items() if name not in GOOD)
     points = [
-        "This verifies formulas against a simulator. It does not validate either against a real robot: friction, "
-        "clearance, elasticity and everything else that the model leaves out is left out on both sides.",
+        NO_REAL_ROBOT,
         "Shares and quantiles are of these designs: they say how the error is spread over the ranges that the campaign "
         "chose, with the weight that it gave them, and not how likely a design is.",
         "Every design follows the case's motion, made faster or slower where the campaign says so. On another path the "
