@@ -40,6 +40,7 @@ __all__ = [
     "load_model",
     "load_text",
     "open_model",
+    "plan_mechanism",
     "read_parameters",
     "read_text",
 ]
@@ -185,6 +186,22 @@ def load_model(
     # the file's structure was checked once; only numbers that are parameters' own have changed since
     refuse_broken(Context(model, base.kind, file, text), wanted)
     return LoadedModel(file, text, model, base.kind(base.kind.parameter_type(**wanted)), base.kind, wanted)
+
+
+def plan_mechanism(path: str | Path, overrides: Mapping[str, float]) -> Mechanism | None:
+    """Return the closed form that `load_model` gives with overrides, without compiling the edited file.
+
+    None where the file names no mechanism.
+
+    Raises
+    ------
+    ModelError, ParameterError
+        The file itself cannot be loaded, or as `Mechanism.with_parameters`.
+    """
+    base = _read_once(read_text(find_model(path)), str(path))
+    if base.kind is None or base.values is None:
+        return None
+    return base.kind(base.kind.parameter_type(**changed_parameters(base.kind, base.values, overrides)))
 
 
 def open_model(path: str | Path) -> LoadedModel:

@@ -28,7 +28,7 @@ from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchEr
 from workbench.mechanisms.assignments import resolve_changes
 from workbench.mechanisms.base import Mechanism
 from workbench.mechanisms.parameters import SIDES
-from workbench.mjcf import LoadedModel, load_model
+from workbench.mjcf import LoadedModel, load_model, plan_mechanism
 from workbench.mjcf_setup import Setup
 from workbench.motion import (
     JointMotion,
@@ -152,17 +152,12 @@ def resolve_case(
         own = _own(model, campaign.setup, tuple(campaign.read.items()), tuple(users))
         return dataclasses.replace(_resolve(spec, file, model, {}, own), setup=campaign.setup)
     # out of reach is found without compiling; the loaded model gives the same parameters, bit for bit, or is refused
-    planned = _unchanged(model).with_parameters(**overrides)
+    planned = _named(plan_mechanism(model, overrides), model)
     case = _resolve(spec, file, model, overrides, planned)
     loaded = load_model(model, overrides)
-    mechanism = _mechanism_of(loaded, model)
+    mechanism = _named(loaded.mechanism, model)
     offer(mechanism, users)
     return dataclasses.replace(case, loaded=loaded, mechanism=mechanism)
-
-
-@lru_cache(maxsize=1)
-def _unchanged(model: Path) -> Mechanism:
-    return _mechanism_of(load_model(model), model)
 
 
 @lru_cache(maxsize=1)
@@ -232,16 +227,16 @@ def mechanism_with(path: Path, overrides: Mapping[str, float], campaign: Campaig
         if overrides:
             raise _cannot_be_set(path, overrides)
         return generic_mechanism(path, campaign.setup, tuple(campaign.read.items()))
-    return _mechanism_of(load_model(path, overrides), path)
+    return _named(load_model(path, overrides).mechanism, path)
 
 
-def _mechanism_of(loaded: LoadedModel, path: Path) -> Mechanism:
-    if loaded.mechanism is None:
+def _named(mechanism: Mechanism | None, path: Path) -> Mechanism:
+    if mechanism is None:
         raise SpecError(
             f'{path}: <custom> has no <text name="mechanism">, so there is no closed form to'
             " validate; a mechanism of your own needs actuated and platform_site in the campaign"
         )
-    return loaded.mechanism
+    return mechanism
 
 
 def _check_candidates(campaign: Campaign, mechanism: Mechanism) -> None:
