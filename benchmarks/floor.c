@@ -1,6 +1,6 @@
 /* The floor of the benchmarks: the closed forms' equations in plain C, for both robots.
 
-   A benchmark artefact, not part of the package: the equations of workbench/mechanisms/<robot>_kernel.py, line by line,
+   A benchmark artefact, not part of the package: the equations of workbench/robots/<robot>/kernel.py, line by line,
    with the constants that their pack() makes. Compiled on the spot, once as a plain loop (-O3 -march=native) and once in
    blocks for a vector math library (-ffast-math and libmvec, which is why NaN may get lost there). */
 

@@ -26,7 +26,7 @@ from samples import Samples, model, scattered, smooth
 from timing import Rounds, in_turn
 
 import workbench as wb
-from workbench.mechanisms.base import Mechanism
+from workbench.robots.base import Mechanism
 
 FORMAT = 1
 RESULTS = Path(__file__).with_name("results")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.mechanisms.planar_4rprp import Planar4Rprp
-from workbench.mjcf import load_mechanism
+from workbench.robots.load import load_mechanism
+from workbench.robots.planar_4rprp.closed_form import Planar4Rprp
 
 MODEL = str(Path(__file__).resolve().parents[1] / "models" / "planar_4rprp.xml")
 HOME = np.array([0.3893182978, 0.3768866111, 0.3893182978])

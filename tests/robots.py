@@ -9,7 +9,7 @@ import numpy as np
 
 import workbench as wb
 from workbench.errors import MotionError
-from workbench.mechanisms.base import Mechanism
+from workbench.robots.base import Mechanism
 
 MODEL = Path(__file__).resolve().parents[1] / "models" / "asym_2rss_ppap.xml"
 NOMINAL = {"L": 0.2, "l": 0.1, "a1": 0.2, "a2": 0.3, "a5": 0.25, "m1": 0.2, "m2": 0.3, "m3": 0.45, "m4": 0.1,

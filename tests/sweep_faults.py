@@ -10,8 +10,8 @@ from functools import partial
 from typing import Any
 
 from sweep_tasks import suffer
-from workbench.campaign.sweep import evaluate
-from workbench.campaign.sweep.evaluate import Context
+from workbench.sweep import evaluate
+from workbench.sweep.evaluate import Context
 
 
 def faulty_setup(context: Context, faults: Mapping[int, str]) -> Callable[[Any], Any]:

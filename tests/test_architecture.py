@@ -21,10 +21,11 @@ MAX_LINES = 400
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("cli", "commands", "console"),
     ("report", "compare", "rendering"),
+    ("sweep",),
     ("campaign", "workspace"),
     ("reference",),
+    ("robots",),
     ("mjcf",),
-    ("mechanisms",),
     (
         "motion",
         "metrics",
@@ -35,16 +36,17 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "arrays",
         "errors",
         "data_files",
+        "limits",
         "_version",
     ),
 )
 """Top to bottom; a module may import its own layer and those below. The package's own __init__ may import any."""
 
-ENGINE_LAYERS = ("mjcf", "reference", "rendering")
+ENGINE_LAYERS = ("mjcf", "robots", "reference", "rendering")
 """The only places that may import mujoco; rendering, since MuJoCo draws the models."""
 
-NEUTRAL_MECHANISM_MODULES = ("workbench.mechanisms.base", "workbench.mechanisms.parameters")
-"""What the reference may see of the closed forms: the interface, no formula."""
+CLOSED_FORMS = ("workbench.robots.asym_2rss_ppap", "workbench.robots.planar_4rprp")
+"""Packages of formulas: they know neither the engine nor files, and the reference does not know them."""
 
 HEAVY = ("mujoco", "numba", "pandas", "matplotlib", "scipy", "pinocchio")
 """What `import workbench` must not load."""
@@ -55,7 +57,11 @@ def layer_of(module: str) -> str | None:
     parts = module.split(".")
     if len(parts) == 1:
         return None
-    return "mjcf" if parts[1] == "mjcf" or parts[1].startswith("mjcf_") else parts[1]
+    return parts[1]
+
+
+def is_closed_form(module: str) -> bool:
+    return module.startswith(CLOSED_FORMS)
 
 
 def rank(layer: str) -> int | None:
@@ -93,8 +99,8 @@ def imported_modules(path: Path, root: Path) -> Iterator[tuple[int, str]]:
 def findings_of_import(importer: str, imported: str) -> Iterator[str]:
     layer = layer_of(importer)
     top = imported.partition(".")[0]
-    if top == "mujoco" and layer not in ENGINE_LAYERS:
-        yield f"imports mujoco; only {' and '.join(ENGINE_LAYERS)} may"
+    if top == "mujoco" and (layer not in ENGINE_LAYERS or is_closed_form(importer)):
+        yield f"imports mujoco; only {' and '.join(ENGINE_LAYERS)} may, and no closed form"
     if top != PACKAGE or layer is None:
         return
     target = layer_of(imported)
@@ -104,8 +110,10 @@ def findings_of_import(importer: str, imported: str) -> Iterator[str]:
     own, other = rank(layer), rank(target)
     if own is not None and other is not None and other < own:
         yield f"imports {imported}, a layer above"
-    if layer == "reference" and target == "mechanisms" and imported not in NEUTRAL_MECHANISM_MODULES:
+    if layer == "reference" and is_closed_form(imported):
         yield f"imports {imported}; the reference must not know a closed form"
+    if is_closed_form(importer) and target == "mjcf":
+        yield f"imports {imported}; a closed form knows no file"
     if layer == "report" and target == "reference":
         yield f"imports {imported}; a report reads stored results only"
 
@@ -139,35 +147,35 @@ CLEAN = {
     "cli.py": "from workbench.report import build",
     "report/__init__.py": "from workbench.campaign import store\nfrom . import figures",
     "report/figures.py": "import matplotlib",
-    "campaign/__init__.py": "from workbench.reference import load\nfrom workbench.mechanisms import closed",
+    "campaign/__init__.py": "from workbench.reference import load\nfrom workbench.robots.planar_4rprp import closed",
     "campaign/store.py": "import json",
-    "reference/__init__.py": "import mujoco\nfrom workbench import mjcf\nfrom workbench.mechanisms import base",
-    "mjcf.py": "from mujoco import MjModel\nfrom workbench.mechanisms.closed import X\nimport workbench.mjcf_edit",
-    "mjcf_edit.py": "import mujoco",
-    "mechanisms/__init__.py": "from .closed import X",
-    "mechanisms/base.py": "from workbench.arrays import as_batch",
-    "mechanisms/closed.py": "from workbench.mechanisms.base import Mechanism\nfrom ..errors import WorkbenchError",
+    "reference/__init__.py": "import mujoco\nfrom workbench import mjcf\nfrom workbench.robots import base",
+    "mjcf/text.py": "from mujoco import MjModel",
+    "robots/edit.py": "import mujoco\nimport workbench.mjcf.text",
+    "robots/base.py": "from workbench.arrays import as_batch",
+    "robots/planar_4rprp/closed.py": "from workbench.robots.base import X\nfrom ...errors import WorkbenchError",
     "arrays.py": "from workbench.errors import ArrayError",
     "errors.py": "import difflib",
 }
 
-CLOSED = "mechanisms/closed.py"
+CLOSED = "robots/planar_4rprp/closed.py"
 REFERENCE = "reference/__init__.py"
 FOR_TYPES = "if TYPE_CHECKING:\n    import workbench.arrays\n    import workbench.cli"
 
 PLANTED = {
-    "a lower layer imports an upper one": ("arrays.py", "from workbench.mechanisms import base", "a layer above"),
+    "a lower layer imports an upper one": ("arrays.py", "from workbench.robots import base", "a layer above"),
     "a relative import upwards": ("campaign/store.py", "from ..report import figures", "a layer above"),
     "a relative import of the package upwards": ("campaign/store.py", "from .. import cli", "a layer above"),
     "an import inside a function": ("campaign/store.py", "def f():\n    import workbench.cli", "a layer above"),
     "an import for types only": ("errors.py", FOR_TYPES, "a layer above"),
     "a closed form imports mujoco": (CLOSED, "import mujoco.batch", "imports mujoco"),
     "a closed form imports mujoco by its name": (CLOSED, "importlib.import_module('mujoco')", "imports mujoco"),
-    "a closed form imports mjcf": (CLOSED, "from workbench import mjcf", "a layer above"),
-    "a closed form imports mjcf_edit": (CLOSED, "import workbench.mjcf_edit", "a layer above"),
+    "a closed form imports mjcf": (CLOSED, "from workbench import mjcf", "knows no file"),
+    "a closed form imports the text of a model": (CLOSED, "import workbench.mjcf.text", "knows no file"),
+    "mjcf knows a robot": ("mjcf/text.py", "from workbench.robots import base", "a layer above"),
     "a closed form imports the reference": (CLOSED, "from workbench.reference import load", "a layer above"),
-    "the reference knows a mechanism": (REFERENCE, "from workbench.mechanisms.closed import X", "closed form"),
-    "the reference knows one by its package": (REFERENCE, "from workbench.mechanisms import X", "closed form"),
+    "the reference knows a mechanism": (REFERENCE, "from workbench.robots.planar_4rprp.closed import X", "closed form"),
+    "the reference knows one by its package": (REFERENCE, "from workbench.robots import planar_4rprp", "closed form"),
     "a report imports the reference": ("report/figures.py", "from workbench.reference import load", "stored results"),
     "a report imports mujoco": ("report/figures.py", "import mujoco", "imports mujoco"),
     "a campaign imports mujoco": ("campaign/store.py", "from mujoco import mj_step", "imports mujoco"),

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 import workbench as wb
 from robots import MODEL, Motion, motion_inside, peak_error, random_changes, sine_sum, table_1
 from workbench.errors import ArrayError, MotionError, ParameterError
-from workbench.mechanisms.base import Mechanism
+from workbench.robots.base import Mechanism
 
 EXACT = 1e-12  # rounding, relative to the quantity's peak
 DIFFERENCES = 1e-8  # what eighth-order differences with STEP leave, with a margin

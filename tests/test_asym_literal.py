@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from workbench.mechanisms import asym_2rss_ppap_literal as literal
-from workbench.mechanisms.asym_2rss_ppap import Asym2rssPpap
-from workbench.mechanisms.asym_2rss_ppap_literal import Misprint
-from workbench.mechanisms.asym_2rss_ppap_parameters import Parameters
 from workbench.metrics import relative_error
+from workbench.robots.asym_2rss_ppap import literal
+from workbench.robots.asym_2rss_ppap.closed_form import Asym2rssPpap
+from workbench.robots.asym_2rss_ppap.literal import Misprint
+from workbench.robots.asym_2rss_ppap.parameters import Parameters
 
 STEP = 5e-4  # of the eighth-order differences: poses within 0.03 of the workspace boundary allow no larger one
 ORACLE_TOLERANCE = 1e-9  # relative to the joint's peak: what those differences leave, with a margin

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import workbench as wb
-from workbench.mechanisms import asym_2rss_ppap_mobility as count
-from workbench.mechanisms import screws
+from workbench.robots import screws
+from workbench.robots.asym_2rss_ppap import mobility as count
 
 MODEL = "models/asym_2rss_ppap.xml"
 

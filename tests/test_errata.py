@@ -15,8 +15,8 @@ from workbench.campaign.run import Outcome, run_campaign
 from workbench.campaign.spec import load_campaign
 from workbench.campaign.verdict import kind_of, verdict_of
 from workbench.errors import SpecError
-from workbench.mechanisms.asym_2rss_ppap_candidates import CANDIDATES, MISPRINT_NAMES
-from workbench.mechanisms.asym_2rss_ppap_literal import APPENDIX_AS_PRINTED, Misprint, lumped_appendix
+from workbench.robots.asym_2rss_ppap.candidates import CANDIDATES, MISPRINT_NAMES
+from workbench.robots.asym_2rss_ppap.literal import APPENDIX_AS_PRINTED, Misprint, lumped_appendix
 
 BOUND = 1e-10
 ERRORS_ONLY = Effort(budget=False)

@@ -22,12 +22,12 @@ import sweep_tasks
 from small_campaign import Workbench
 from sweep_campaign import SWEEP
 from test_report import parse
-from workbench.campaign.sweep import run as sweep_run
-from workbench.campaign.sweep.evaluate import Context
-from workbench.campaign.sweep.run import SweepOptions
-from workbench.campaign.sweep.supervisor import Lost, Supervisor, cause
 from workbench.errors import WorkbenchError
 from workbench.report.build import build_report
+from workbench.sweep import run as sweep_run
+from workbench.sweep.evaluate import Context
+from workbench.sweep.run import SweepOptions
+from workbench.sweep.supervisor import Lost, Supervisor, cause
 
 
 @pytest.fixture
@@ -112,7 +112,7 @@ def alive(pid: int) -> bool:
 def test_workers_die_with_their_parent_even_in_the_middle_of_a_case() -> None:
     code = (
         "import itertools, sys, threading, time, sweep_tasks\n"
-        "from workbench.campaign.sweep.supervisor import Supervisor\n"
+        "from workbench.sweep.supervisor import Supervisor\n"
         "pool = Supervisor(2, sweep_tasks.echo_setup, 600.0, 400.0, 1)\n"
         "def tell():\n"
         "    while sum(w.task is not None for w in pool._workers) < 2: time.sleep(0.01)\n"

@@ -16,9 +16,9 @@ from robots import MODEL, Motion, motion_inside, peak_error, random_changes, slo
 from workbench.campaign.run import run_campaign
 from workbench.dry_friction import REST_SPEED, direction
 from workbench.errors import ModelError, ParameterError
-from workbench.mechanisms.base import Mechanism
-from workbench.mjcf_edit import edit_file
 from workbench.reference.power import power_balance
+from workbench.robots.base import Mechanism
+from workbench.robots.edit import edit_file
 
 ROUND_OFF = 1e-10
 DIFFERENCES = 1e-8

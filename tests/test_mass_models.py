@@ -15,8 +15,8 @@ from robots import MODEL, Motion, motion_inside, peak_error, random_changes, tab
 from workbench.campaign.evidence import Effort
 from workbench.campaign.run import Outcome, run_campaign
 from workbench.errors import ParameterError
-from workbench.mechanisms.base import Mechanism
-from workbench.mechanisms.mass_models import (
+from workbench.robots.base import Mechanism
+from workbench.robots.mass_models import (
     MASS_MODELS,
     Bar,
     BarModel,

@@ -13,9 +13,9 @@ import pytest
 from robots import peak_error
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError
-from workbench.mjcf import load_model, open_model
-from workbench.mjcf_assumptions import check_assumptions
 from workbench.reference.check import check_model
+from workbench.robots.assumptions.check import check_assumptions
+from workbench.robots.load import load_model, open_model
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 ASYM, PLANAR = MODELS / "asym_2rss_ppap.xml", MODELS / "planar_4rprp.xml"

@@ -18,13 +18,13 @@ from hypothesis import strategies as st
 from robots import peak_error
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, OutputError, ParameterError, WorkbenchError
-from workbench.mechanisms.assignments import parse_assignment, resolve_changes
-from workbench.mechanisms.parameters import stored_names
-from workbench.mjcf import LoadedModel, load_model
-from workbench.mjcf_edit import edit_file, resolve_for
-from workbench.mjcf_show import show_parameters
-from workbench.mjcf_text import find, scan, tokens
-from workbench.mjcf_values import precise, quotient
+from workbench.mjcf.text import find, scan, tokens
+from workbench.robots.assignments import parse_assignment, resolve_changes
+from workbench.robots.edit import edit_file, resolve_for
+from workbench.robots.load import LoadedModel, load_model
+from workbench.robots.parameters import stored_names
+from workbench.robots.show import show_parameters
+from workbench.robots.values import precise, quotient
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 ASYM, PLANAR = MODELS / "asym_2rss_ppap.xml", MODELS / "planar_4rprp.xml"

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import workbench as wb
 from robots import MODEL, random_changes, table_1
 from workbench.errors import ModelError, ParameterError
-from workbench.mjcf import load_model, load_text
+from workbench.robots.load import load_model, load_text
 
 TEXT = MODEL.read_text(encoding="utf-8")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")

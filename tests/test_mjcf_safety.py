@@ -14,11 +14,11 @@ import pytest
 
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, WorkbenchError
-from workbench.mjcf import load_model, open_model
-from workbench.mjcf_edit import edit_file
-from workbench.mjcf_safety import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
-from workbench.mjcf_show import show_parameters
+from workbench.mjcf.safety import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
 from workbench.reference.check import check_model
+from workbench.robots.edit import edit_file
+from workbench.robots.load import load_model, open_model
+from workbench.robots.show import show_parameters
 
 ASYM = Path(__file__).resolve().parents[1] / "models" / "asym_2rss_ppap.xml"
 TEXT = ASYM.read_text()

@@ -19,8 +19,8 @@ from test_mjcf_assumptions import HAND_EDITS, HandEdit, mirror_home
 from test_mjcf_edit import assert_bit_equal, assert_only_numbers_moved, random_values
 from workbench.campaign.rerun import compute_errors
 from workbench.errors import MotionError
-from workbench.mjcf_edit import edit_file
-from workbench.mjcf_show import show_parameters
+from workbench.robots.edit import edit_file
+from workbench.robots.show import show_parameters
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 ASYM, PLANAR = MODELS / "asym_2rss_ppap.xml", MODELS / "planar_4rprp.xml"

@@ -17,10 +17,10 @@ import pytest
 
 from small_campaign import HEAD, Workbench
 from workbench.arrays import FloatArray
-from workbench.mechanisms import asym_2rss_ppap_literal as literal
-from workbench.mechanisms.asym_2rss_ppap import Asym2rssPpap
-from workbench.mechanisms.asym_2rss_ppap_literal import Misprint
-from workbench.mechanisms.base import Mechanism
+from workbench.robots.asym_2rss_ppap import literal
+from workbench.robots.asym_2rss_ppap.closed_form import Asym2rssPpap
+from workbench.robots.asym_2rss_ppap.literal import Misprint
+from workbench.robots.base import Mechanism
 
 Torques = Callable[[Mechanism, FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 

@@ -149,7 +149,7 @@ def test_a_formula_runs_only_when_the_command_line_names_its_file(workbench: Wor
 def test_formulas_for_a_built_in_robot_get_its_parameters_and_the_force(workbench: Workbench) -> None:
     code = (
         "@workbench.candidate('mine', bound=1e-10)\ndef mine(p, q, qd, qdd, f):\n"
-        "    from workbench.mechanisms.asym_2rss_ppap import Asym2rssPpap\n"
+        "    from workbench.robots.asym_2rss_ppap.closed_form import Asym2rssPpap\n"
         "    return Asym2rssPpap(p).inverse_dynamics(q, qd, qdd, 'distributed', f)\n"
     )
     assert run(workbench, code, SMALL).code == 0

@@ -10,7 +10,7 @@ import pytest
 from own_mechanisms import FOURBAR, PARALLELOGRAM
 from workbench.campaign.generic import generic_mechanism
 from workbench.errors import ModelError, MotionError, WorkbenchError
-from workbench.mjcf_setup import Setup
+from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
 from workbench.reference.power import power_balance
 

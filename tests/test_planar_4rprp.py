@@ -25,12 +25,12 @@ from planar_4rprp_cases import (
     second_rate,
     slow,
 )
-from workbench.mechanisms import planar_4rprp_screws as screw_route
-from workbench.mechanisms import screws
-from workbench.mechanisms.planar_4rprp import HOME_SOLUTION, Planar4Rprp
-from workbench.mechanisms.planar_4rprp_parameters import Parameters
-from workbench.mjcf import load_mechanism
 from workbench.reference.mujoco_reference import MujocoReference
+from workbench.robots import screws
+from workbench.robots.load import load_mechanism
+from workbench.robots.planar_4rprp import screws as screw_route
+from workbench.robots.planar_4rprp.closed_form import HOME_SOLUTION, Planar4Rprp
+from workbench.robots.planar_4rprp.parameters import Parameters
 
 
 @pytest.fixture(scope="module")

@@ -15,11 +15,11 @@ from planar_4rprp_cases import (
     scattered,
 )
 from workbench.errors import MotionError, ParameterError
-from workbench.mechanisms.planar_4rprp import Planar4Rprp
-from workbench.mechanisms.planar_4rprp_mobility import gogu_mobility, loop_matrix
-from workbench.mechanisms.planar_4rprp_singularity import PaperCondition, paper_singularity_conditions, parallelism
-from workbench.mjcf import load_mechanism, load_model
 from workbench.reference.mujoco_reference import MujocoReference
+from workbench.robots.load import load_mechanism, load_model
+from workbench.robots.planar_4rprp.closed_form import Planar4Rprp
+from workbench.robots.planar_4rprp.mobility import gogu_mobility, loop_matrix
+from workbench.robots.planar_4rprp.singularity import PaperCondition, paper_singularity_conditions, parallelism
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import pytest
 
 import workbench as wb
 from robots import MODEL, Motion, motion_inside, peak_error, random_changes
-from workbench.mechanisms.base import Mechanism
+from workbench.robots.base import Mechanism
 
 BOUND = 1e-10  # peak-normalised, per joint: rounding with a wide margin, below any modelling error
 TIME = np.linspace(0.0, 1.0, 60)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import workbench as wb
-from workbench.mechanisms.base import Mechanism
+from workbench.robots.base import Mechanism
 
 MODEL = "models/asym_2rss_ppap.xml"
 FORCE = np.array([7.0, -4.0, 11.0])

@@ -11,8 +11,8 @@ import pytest
 import workbench as wb
 from robots import MODEL, FourBar, sine_sum, table_1, write_model
 from workbench.errors import ModelError, MotionError
-from workbench.mechanisms.base import Mechanism
 from workbench.reference import ReferenceResult
+from workbench.robots.base import Mechanism
 
 SAME = 1e-12
 CONNECT = '<connect name="loop" site1="coupler_tip" site2="rocker_tip"/>'

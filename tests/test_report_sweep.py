@@ -18,7 +18,6 @@ from small_campaign import Workbench
 from sweep_campaign import SWEEP
 from sweep_store import KEYS, STATUSES, make_sweep
 from test_report import NASTY, markdown_tables, parse, remove, replace, truncate
-from workbench.campaign.sweep import run as sweep_run
 from workbench.commands.sweeps import report_apart
 from workbench.errors import OutputError
 from workbench.report import build_report
@@ -27,6 +26,7 @@ from workbench.report.sweep.cases import rerun_command
 from workbench.report.sweep.load import SweepRun, load_sweep
 from workbench.report.sweep.verdict import verdict
 from workbench.report.text import percent
+from workbench.sweep import run as sweep_run
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from workbench.mechanisms import screws
+from workbench.robots import screws
 
 RNG = np.random.default_rng(20161109)
 TOLERANCE = 1e-13

@@ -18,16 +18,17 @@ import pytest
 import workbench as wb
 from workbench.compiled import KERNEL_FILES
 from workbench.errors import ArrayError, MotionError, ParameterError
-from workbench.mechanisms import asym_2rss_ppap_kernel, planar_4rprp_kernel
-from workbench.mechanisms.base import Mechanism
-from workbench.mechanisms.blocks import BLOCK
-from workbench.mechanisms.kernel_call import SAMPLES_PER_THREAD
-from workbench.mechanisms.sine_cosine import HALF_PI_HIGH, HALF_PI_MIDDLE, LARGEST_ANGLE, sine_cosine
+from workbench.robots.asym_2rss_ppap import kernel as asym_kernel
+from workbench.robots.base import Mechanism
+from workbench.robots.blocks import BLOCK
+from workbench.robots.kernel_call import SAMPLES_PER_THREAD
+from workbench.robots.planar_4rprp import kernel as planar_kernel
+from workbench.robots.sine_cosine import HALF_PI_HIGH, HALF_PI_MIDDLE, LARGEST_ANGLE, sine_cosine
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 BENCHMARKS = REPOSITORY / "benchmarks"
 PLACES = {"asym_2rss_ppap": (0.02, 0.03, 0.40), "planar_4rprp": (0.26, 0.25, 0.30)}
-KERNELS = {"asym_2rss_ppap": asym_2rss_ppap_kernel, "planar_4rprp": planar_4rprp_kernel}
+KERNELS = {"asym_2rss_ppap": asym_kernel, "planar_4rprp": planar_kernel}
 SAMPLES = BLOCK + 37
 """A full block and one that is not, with a remainder that fills no vector."""
 
@@ -376,7 +377,7 @@ def test_a_read_only_installation_keeps_its_kernels_in_the_users_cache(read_only
     second = use(read_only_package, cache)
     assert second == first[1:]
     # a kernel is made of other files too, and does not outlive a change in them
-    blocks = read_only_package / "mechanisms/sine_cosine.py"
+    blocks = read_only_package / "robots/sine_cosine.py"
     blocks.write_text(blocks.read_text() + "\n# changed\n")
     assert [line.split()[0] for line in use(read_only_package, cache)] == ["NOTICE", "TAU"]
 

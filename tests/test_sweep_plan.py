@@ -10,10 +10,10 @@ import pytest
 from small_campaign import Workbench, listing
 from sweep_campaign import SWEEP
 from workbench.campaign.spec import load_campaign
-from workbench.campaign.sweep.plan import Plan, plan_sweep
-from workbench.campaign.sweep.samples import sweep_values
-from workbench.campaign.sweep.spec import SweepSpec
+from workbench.campaign.sweep_spec import SweepSpec
 from workbench.errors import WorkbenchError
+from workbench.sweep.plan import Plan, plan_sweep
+from workbench.sweep.samples import sweep_values
 
 HEAD, _, _ = SWEEP.partition("[sweep]")
 

@@ -22,13 +22,13 @@ import workbench as wb
 from small_campaign import SMALL, Workbench, listing
 from sweep_campaign import SWEEP
 from workbench.campaign.lock import holder, lock_path, locked
-from workbench.campaign.sweep import files, identity
-from workbench.campaign.sweep import run as sweep_run
-from workbench.campaign.sweep.evaluate import Context
-from workbench.campaign.sweep.journal import Journal
-from workbench.campaign.sweep.record import Record, lost, parse_line
-from workbench.campaign.sweep.run import SweepOptions
 from workbench.errors import OutputError
+from workbench.sweep import files, identity
+from workbench.sweep import run as sweep_run
+from workbench.sweep.evaluate import Context
+from workbench.sweep.journal import Journal
+from workbench.sweep.record import Record, lost, parse_line
+from workbench.sweep.run import SweepOptions
 
 FEW = SWEEP.replace("samples = 40", "samples = 10")
 RESULTS = ("cases", "summary", "series", "sweep.json")
@@ -139,7 +139,7 @@ def test_statistics_are_those_of_the_rows(calm: Path) -> None:
 
 
 def test_every_key_is_documented(calm: Path, repository: Path) -> None:
-    from workbench.campaign.sweep import spec
+    from workbench.campaign import sweep_spec as spec
 
     text = (repository / "docs" / "sweeps.md").read_text(encoding="utf-8")
     summary = json.loads((calm / "sweep.json").read_text())
@@ -273,7 +273,7 @@ def test_other_versions_are_refused(
 ) -> None:
     before = listing(calm)
     other = {**identity.versions(), what: "9.9.9"}
-    monkeypatch.setattr("workbench.campaign.sweep.state.versions", lambda: other)
+    monkeypatch.setattr("workbench.sweep.state.versions", lambda: other)
     done = workbench("run", "small.toml", "--out", "calm")
     assert done.code == 2
     assert len(done.complaint) == 1

@@ -10,7 +10,7 @@ import pytest
 import workbench as wb
 from workbench.cli import _run
 from workbench.errors import MotionError, ParameterError
-from workbench.mechanisms.base import Mechanism
+from workbench.robots.base import Mechanism
 from workbench.workspace.grid import Workspace, compute_workspace
 
 MODELS = ("models/asym_2rss_ppap.xml", "models/planar_4rprp.xml")

@@ -16,18 +16,18 @@ from workbench._version import __version__
 
 if TYPE_CHECKING:
     from workbench.errors import WorkbenchError
-    from workbench.mechanisms.registration import candidate
-    from workbench.mjcf import load_mechanism
     from workbench.reference import MujocoReference
     from workbench.report.frames import load_run
+    from workbench.robots.load import load_mechanism
+    from workbench.robots.registration import candidate
 
 __all__ = ["MujocoReference", "WorkbenchError", "__version__", "candidate", "load_mechanism", "load_run"]
 
 _HOMES = {
     "MujocoReference": "workbench.reference",
     "WorkbenchError": "workbench.errors",
-    "candidate": "workbench.mechanisms.registration",
-    "load_mechanism": "workbench.mjcf",
+    "candidate": "workbench.robots.registration",
+    "load_mechanism": "workbench.robots.load",
     "load_run": "workbench.report.frames",
 }
 

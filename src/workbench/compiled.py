@@ -20,9 +20,9 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 computed alone, in a vector register with others, or in another thread. A division by zero is infinite, as in NumPy."""
 
 KERNEL_FILES = (
-    *(f"mechanisms/asym_2rss_ppap_{name}.py" for name in ("kernel", "friction")),
-    *(f"mechanisms/planar_4rprp_{name}.py" for name in ("kernel", "friction")),
-    *(f"mechanisms/{name}.py" for name in ("blocks", "sine_cosine")),
+    *(f"robots/asym_2rss_ppap/{name}.py" for name in ("kernel", "friction")),
+    *(f"robots/planar_4rprp/{name}.py" for name in ("kernel", "friction")),
+    *(f"robots/{name}.py" for name in ("blocks", "sine_cosine")),
     *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "structure", "tables")),
 )
 """What machine code is made of. A kernel calls into other files, and its cache must not outlive a change in those."""

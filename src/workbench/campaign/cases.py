@@ -25,11 +25,7 @@ from workbench.campaign.spec import (
 from workbench.campaign.user_candidates import UserCandidate, offer
 from workbench.data_files import bundled, bundled_names
 from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
-from workbench.mechanisms.assignments import resolve_changes
-from workbench.mechanisms.base import Mechanism
-from workbench.mechanisms.parameters import SIDES
-from workbench.mjcf import LoadedModel, load_model, plan_mechanism
-from workbench.mjcf_setup import Setup
+from workbench.mjcf.setup import Setup
 from workbench.motion import (
     JointMotion,
     PickAndPlace,
@@ -41,6 +37,10 @@ from workbench.motion import (
     time_grid,
 )
 from workbench.reference.replay import motion_through
+from workbench.robots.assignments import resolve_changes
+from workbench.robots.base import Mechanism
+from workbench.robots.load import LoadedModel, load_model, plan_mechanism
+from workbench.robots.parameters import SIDES
 
 
 @dataclass(frozen=True)

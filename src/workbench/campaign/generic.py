@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.errors import MotionError, ParameterError
-from workbench.mechanisms.base import Mechanism, Reach
-from workbench.mechanisms.kernel_call import TorqueKernel
-from workbench.mechanisms.parameters import ParameterInfo
-from workbench.mjcf_quantities import read_quantities
-from workbench.mjcf_setup import Setup
+from workbench.mjcf.quantities import read_quantities
+from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
 from workbench.reference.structure import SPIN
+from workbench.robots.base import Mechanism, Reach
+from workbench.robots.kernel_call import TorqueKernel
+from workbench.robots.parameters import ParameterInfo
 
 DEGREES = 4.0 * np.pi
 """A hinge that moves through more than two turns was most likely given in degrees."""
@@ -166,7 +166,7 @@ def generic_mechanism(path: Path, setup: Setup, read: tuple[tuple[str, str], ...
     setup
         Actuated joints, platform site, first guess.
     read
-        Parameters for the user's candidates: name and where the model holds it (`workbench.mjcf_quantities`).
+        Parameters for the user's candidates: name and where the model holds it (`workbench.mjcf.quantities`).
 
     Raises
     ------

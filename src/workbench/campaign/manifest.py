@@ -8,8 +8,8 @@ from typing import Any
 
 from workbench.campaign import provenance
 from workbench.campaign.spec import Campaign
-from workbench.mechanisms.base import Mechanism
-from workbench.mechanisms.parameters import stored_names
+from workbench.robots.base import Mechanism
+from workbench.robots.parameters import stored_names
 
 
 def shown(path: Path, campaign_file: Path) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from workbench.campaign.schema import Finite, Strict
-from workbench.mjcf_setup import Setup
+from workbench.mjcf.setup import Setup
 
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,39}$")]
 

@@ -17,7 +17,7 @@ from workbench.campaign.run import compute_named_case
 from workbench.campaign.spec import CsvMotion, load_campaign
 from workbench.campaign.user_candidates import load_candidates, with_rows
 from workbench.errors import WorkbenchError
-from workbench.mjcf import find_model
+from workbench.mjcf.compile import find_model
 
 QUICK = Effort(budget=False, drawing=False)
 """Errors only."""

@@ -20,8 +20,7 @@ from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
 from workbench.campaign.spec import Campaign, load_campaign
-from workbench.campaign.sweep.pick import pick_cases
-from workbench.campaign.user_candidates import load_candidates, with_rows
+from workbench.campaign.user_candidates import UserCandidate, load_candidates, with_rows
 from workbench.errors import SpecError, WorkbenchError
 from workbench.staging import check_output, staged
 
@@ -53,6 +52,10 @@ Progress = Callable[[str, int, int], None]
 """Called with a case's name, its number from 0, and the number of cases; at the end with an empty name."""
 
 
+Pick = Callable[[Campaign, Path, Path | None, Mapping[str, float], Sequence[str], Sequence[UserCandidate]], Campaign]
+"""From a campaign with a sweep to one with some of its cases: campaign, file, model, settings, names, candidates."""
+
+
 def run_campaign(
     path: str | Path,
     out: Path | None = None,
@@ -67,6 +70,7 @@ def run_campaign(
     pictures: Pictures | None = None,
     effort: Effort = FULL,
     candidates: Sequence[str | Path] = (),
+    pick: Pick | None = None,
 ) -> Outcome:
     """Run a campaign and write its run directory.
 
@@ -96,6 +100,8 @@ def run_campaign(
         How much evidence is gathered beside the errors, and with which engines.
     candidates
         Python files, or installed entry points, with formulas of the user's own.
+    pick
+        Makes a campaign of named cases from one with a sweep, `workbench.sweep.pick.pick_cases`.
 
     Raises
     ------
@@ -108,9 +114,9 @@ def run_campaign(
     users = load_candidates(candidates)
     campaign = with_rows(campaign, users)
     if campaign.sweep:
-        if not only:
-            raise SpecError(f"{file}: has a sweep; workbench.campaign.sweep.run.run_sweep runs it")
-        campaign = pick_cases(campaign, file, model, settings or {}, only, users)
+        if not only or pick is None:
+            raise SpecError(f"{file}: has a sweep; workbench.sweep.run.run_sweep runs it")
+        campaign = pick(campaign, file, model, settings or {}, only, users)
     check_output(directory, store.RUN)
     check_engines(effort.engines)
     cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users)

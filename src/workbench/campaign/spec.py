@@ -16,7 +16,7 @@ from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
 from workbench.campaign.own_mechanism import OwnMechanism
 from workbench.campaign.schema import NAME_RULE, Finite, Name, Strict, Triple, Vector
-from workbench.campaign.sweep.spec import Filter, SweepSpec, Vary
+from workbench.campaign.sweep_spec import Filter, SweepSpec, Vary
 from workbench.data_files import bundled
 from workbench.errors import SpecError, WorkbenchError, did_you_mean
 

@@ -24,7 +24,7 @@ def settings(assignments: Iterable[str]) -> tuple[dict[str, float], list[str]]:
         No ``=``, a value that is not a number, or a name given twice.
     """
     # here, because it brings NumPy along, which `workbench --help` need not wait for
-    from workbench.mechanisms.assignments import parse_assignment
+    from workbench.robots.assignments import parse_assignment
 
     found: dict[str, float] = {}
     relative: list[str] = []

@@ -28,7 +28,7 @@ Speed = Annotated[float, typer.Option("--speed", metavar="X", help="1: the motio
 def show(path: ModelFile, json: Json = False) -> None:
     """List every parameter: value, unit, meaning, and the element and attribute of the MJCF that it is read from."""
     from workbench.commands.model_tables import print_json, print_parameters
-    from workbench.mjcf_show import show_parameters
+    from workbench.robots.show import show_parameters
 
     rows = show_parameters(path)
     if json:
@@ -51,7 +51,7 @@ def set_(
     NAME_left or NAME_right touches one limb. A bar stays uniform and slender unless its inertia is given too.
     """
     from workbench.commands.model_tables import print_edit
-    from workbench.mjcf_edit import edit_file
+    from workbench.robots.edit import edit_file
 
     print_edit(edit_file(path, changes, out, in_place))
 

@@ -12,9 +12,9 @@ from rich.table import Table
 from rich.text import Text
 
 from workbench.console import out
-from workbench.mjcf_edit import EditResult
-from workbench.mjcf_show import ParameterRow
 from workbench.reference.check import JointRange, ModelCheck
+from workbench.robots.edit import EditResult
+from workbench.robots.show import ParameterRow
 
 LINES_SHOWN = 12
 """Numbers of changed lines that are listed one by one."""

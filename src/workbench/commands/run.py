@@ -66,10 +66,11 @@ def run(
     from workbench.campaign.evidence import Effort
     from workbench.campaign.run import run_campaign
     from workbench.campaign.spec import load_campaign
-    from workbench.campaign.sweep.run import SweepInterrupted, SweepOptions
     from workbench.commands.sweeps import dry_run as print_dry_run
     from workbench.commands.sweeps import report_apart, run_and_print
     from workbench.console import CaseProgress, print_outcome
+    from workbench.sweep.pick import pick_cases
+    from workbench.sweep.run import SweepInterrupted, SweepOptions
 
     values, relative = settings(set_ or [])
     effort = Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick)
@@ -117,6 +118,7 @@ def run(
                 pictures=RunPictures() if pictures else None,
                 effort=effort,
                 candidates=candidates or (),
+                pick=pick_cases,
             )
         print_outcome(outcome)
         passed = outcome.passed

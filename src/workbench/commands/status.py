@@ -12,8 +12,8 @@ def status(
     run_dir: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="Run directory, of a run that lives or not.")],
 ) -> None:
     """Say how far a run is: running, stopped or finished, its cases by status, rate and time left."""
-    from workbench.campaign.sweep.status import run_status
     from workbench.commands.sweeps import duration
+    from workbench.sweep.status import run_status
 
     found = run_status(run_dir)
     name = f" ({found.campaign})" if found.campaign else ""

@@ -17,11 +17,11 @@ from rich.text import Text
 
 from workbench.campaign.evidence import Effort, check_engines
 from workbench.campaign.spec import Campaign
-from workbench.campaign.sweep.estimate import estimate
-from workbench.campaign.sweep.progress import Snapshot
-from workbench.campaign.sweep.run import SweepOptions, SweepOutcome, run_sweep
 from workbench.console import err, out
 from workbench.errors import OutputError
+from workbench.sweep.estimate import estimate
+from workbench.sweep.progress import Snapshot
+from workbench.sweep.run import SweepOptions, SweepOutcome, run_sweep
 
 LINE_EVERY_S = 10.0
 """Seconds between lines of progress where there is no terminal."""

@@ -35,9 +35,9 @@ def workspace(
     from workbench.campaign.cases import layered, resolve_cases
     from workbench.campaign.spec import load_campaign
     from workbench.console import print_workspace
-    from workbench.mechanisms.assignments import resolve_changes
-    from workbench.mjcf import load_mechanism
     from workbench.report.workspace import draw_workspace
+    from workbench.robots.assignments import resolve_changes
+    from workbench.robots.load import load_mechanism
     from workbench.staging import check_output, staged
     from workbench.workspace.grid import compute_workspace
     from workbench.workspace.store import WORKSPACE, workspace_facts, write_workspace

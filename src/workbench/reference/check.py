@@ -14,14 +14,15 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError, WorkbenchError
-from workbench.mechanisms.base import Mechanism
-from workbench.mjcf import LoadedModel, engine_warnings, load_model, open_model
-from workbench.mjcf_assumptions import Assumption, check_assumptions
-from workbench.mjcf_setup import Setup
+from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.setup import Setup
 from workbench.reference.closure import CLOSED, LoopCloser, constraint_jacobian
 from workbench.reference.engine import Engine
 from workbench.reference.mujoco_reference import Mobility
 from workbench.reference.structure import Structure, read_structure
+from workbench.robots.assumptions.check import Assumption, check_assumptions
+from workbench.robots.base import Mechanism
+from workbench.robots.load import LoadedModel, load_model, open_model
 
 SAME_PLACE = 1e-10
 """Metres: largest distance between the platform of the compiled model and of the closed form. The loops are closed to

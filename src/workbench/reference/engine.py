@@ -19,7 +19,7 @@ from mujoco.batch import Batch
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, ParameterError
-from workbench.mjcf import engine_warnings
+from workbench.mjcf.compile import engine_warnings
 
 LUMPED_INERTIA = 2e-15
 """kg m^2: what stands for "no rotational inertia"; MuJoCo refuses less than 1e-15. Against the smallest bar of the two

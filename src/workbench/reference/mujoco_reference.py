@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
-from workbench.mjcf import LoadedModel, custom_text, load_model
-from workbench.mjcf_setup import Setup
+from workbench.mjcf.compile import custom_text
+from workbench.mjcf.setup import Setup
 from workbench.reference.closure import Assembly, LoopCloser
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
 from workbench.reference.freedoms import check_freedoms
@@ -27,6 +27,7 @@ from workbench.reference.kernels import projection, velocities
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
 from workbench.reference.structure import Structure, read_structure
+from workbench.robots.load import LoadedModel, load_model
 
 MASS_MODELS = ("distributed", "lumped")
 

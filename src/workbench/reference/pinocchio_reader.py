@@ -25,7 +25,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MissingExtraError, ModelError
-from workbench.mjcf_text import scan
+from workbench.mjcf.text import scan
 
 INSTALL = 'pip install "parallel-robot-workbench[pinocchio]"'
 OLDEST = (4, 1)

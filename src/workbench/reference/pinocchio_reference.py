@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike
 from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
-from workbench.mjcf import custom_text, load_model
-from workbench.mjcf_setup import Setup
+from workbench.mjcf.compile import custom_text
+from workbench.mjcf.setup import Setup
 from workbench.reference.pinocchio_loops import PinocchioLoops
 from workbench.reference.pinocchio_reader import import_pinocchio, read, without_inertia
 from workbench.reference.structure import CONNECT, SPIN, WELD, read_structure
+from workbench.robots.load import load_model
 
 MASS_MODELS = ("distributed", "lumped")
 

@@ -13,8 +13,8 @@ from numpy.polynomial import Polynomial
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError
-from workbench.mjcf import custom_text
-from workbench.mjcf_values import inertia_matrix
+from workbench.mjcf.compile import custom_text
+from workbench.robots.values import inertia_matrix
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 

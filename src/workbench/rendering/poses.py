@@ -12,11 +12,11 @@ from workbench.arrays import FloatArray
 from workbench.campaign.cases import course_of, resolve_cases
 from workbench.campaign.spec import load_campaign
 from workbench.errors import MotionError, WorkbenchError
-from workbench.mjcf import open_model
 from workbench.reference import MujocoReference
 from workbench.reference.closure import LoopCloser
 from workbench.reference.engine import Engine
 from workbench.reference.structure import read_structure
+from workbench.robots.load import open_model
 
 MOST_FRAMES = 6000
 """Frames of one film: four minutes at 25 a second."""

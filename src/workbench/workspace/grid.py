@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import FloatArray
 from workbench.errors import ParameterError, did_you_mean
-from workbench.mechanisms.base import Mechanism
+from workbench.robots.base import Mechanism
 
 CELLS_ACROSS = 60
 """Cells along the longest side of the box, where the user gives no spacing."""

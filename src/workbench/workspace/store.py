@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from workbench.mechanisms.base import Mechanism
+from workbench.robots.base import Mechanism
 from workbench.staging import DirectoryKind
 from workbench.workspace.grid import Workspace
 

@@ -1,0 +1,237 @@
+"""Edit single numbers in an MJCF text and leave every other byte alone: comments, layout, units, precision.
+
+MuJoCo's own writer drops comments and rounds to six digits, so it is not a way to edit a user's file. Here expat says
+where each element starts, and only the tokens of the attributes that have to change are replaced.
+"""
+
+from __future__ import annotations
+
+import re
+import xml.parsers.expat as expat
+from dataclasses import dataclass
+
+from workbench.errors import ModelError
+from workbench.mjcf.safety import not_finite, refuse_element
+
+TAG = re.compile(r"""<[^\s/>]+(?:\s+[^\s=/>]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*/?>""")
+ATTRIBUTE = re.compile(r"""([^\s=<>/]+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+SUSPECT = re.compile(r"nan|inf", re.IGNORECASE)
+
+SECTIONS = {"option": "option"}
+"""Section in which an element that carries parameters stands; ``worldbody`` where not said. Other sections use some of
+the same tags for other things: ``joint`` in ``equality``, ``site`` in ``tendon``."""
+
+PLAIN_DIGITS = 17
+"""Significant digits that every double fits into; a longer token holds more than the double (`precise`)."""
+
+
+@dataclass(frozen=True)
+class Element:
+    """One start tag: its name, the body that holds it, the section it stands in, and where its text lies."""
+
+    tag: str
+    name: str
+    body: str
+    section: str
+    start: int
+    end: int
+    line: int
+
+
+@dataclass(frozen=True)
+class Edit:
+    """One number to be written: ``attribute[index]`` of an element."""
+
+    tag: str
+    name: str
+    attribute: str
+    index: int
+    value: float
+    token: str = ""
+    """its text, where the shortest one does not do"""
+
+
+def scan(text: str, file: str) -> list[Element]:
+    """List the start tags of an MJCF text.
+
+    Raises
+    ------
+    ModelError
+        Not well-formed, a document type (entity bombs), a number that is not finite, or anything that
+        `workbench.mjcf.safety` refuses.
+    """
+    raw = text.encode()
+    found: list[tuple[str, str, str, str, int, int]] = []
+    bodies: list[str] = []
+    path: list[str] = []
+    names: set[str] = set()
+    suspects: list[tuple[str, str, str, int]] = []
+    suspicious = SUSPECT.search(text) is not None
+    parser = expat.ParserCreate("utf-8")
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        line = parser.CurrentLineNumber
+        refuse_element(tag, attributes, len(path), len(found), f"{file}:{line}")
+        name = attributes.get("name", "")
+        path.append(tag)
+        if tag == "body":
+            bodies.append(name)
+        if suspicious:
+            names.update(attributes.get(key, "") for key in ("name", "class"))
+            value = not_finite(attributes)
+            if value:
+                suspects.append((tag, *value, line))
+        section = path[1] if len(path) > 1 else ""
+        found.append((tag, name, bodies[-1] if bodies else "", section, parser.CurrentByteIndex, line))
+
+    def finish(tag: str) -> None:
+        path.pop()
+        if tag == "body":
+            bodies.pop()
+
+    def refuse_doctype(*_: object) -> None:
+        line = parser.CurrentLineNumber
+        raise ModelError(f"{file}:{line}: a document type declaration is not allowed in a model", file=file)
+
+    parser.StartElementHandler = begin
+    parser.EndElementHandler = finish
+    parser.StartDoctypeDeclHandler = refuse_doctype
+    try:
+        parser.Parse(raw, True)
+    except expat.ExpatError as error:
+        message = expat.errors.messages[error.code]
+        raise ModelError(f"{file}:{error.lineno}: not well-formed XML: {message}", file=file) from error
+    for tag, key, value, line in suspects:
+        if value not in names:  # "inf" may be the name of a material
+            raise ModelError(f'{file}:{line}: <{tag} {key}="{value}"> is not finite', file=file, attribute=key)
+    return _located(text, raw, found, file)
+
+
+def _located(text: str, raw: bytes, found: list[tuple[str, str, str, str, int, int]], file: str) -> list[Element]:
+    """Turn byte offsets into places in the text."""
+    elements = []
+    start, before = 0, 0
+    for tag, name, body, section, offset, line in found:
+        start += len(raw[before:offset].decode())
+        before = offset
+        match = TAG.match(text, start)
+        if match is None:  # expat accepted it, so this is a form of tag that no MJCF uses
+            raise ModelError(f"{file}:{line}: cannot read the tag <{tag}>", file=file)
+        elements.append(Element(tag, name, body, section, start, match.end(), line))
+    return elements
+
+
+def find(elements: list[Element], tag: str, name: str) -> Element | None:
+    """Return the element ``<tag name="...">``; an ``inertial`` is named by its body, an ``option`` by nothing.
+
+    Of several ``option`` elements the last one counts, as in MuJoCo.
+    """
+    section = SECTIONS.get(tag, "worldbody")
+    for element in reversed(elements) if tag == "option" else elements:
+        if element.tag == tag and element.section == section and _called(element) == name:
+            return element
+    return None
+
+
+def find_any(elements: list[Element], tag: str, name: str) -> Element | None:
+    """Return the first element of that tag and name, in whatever section, for messages."""
+    return next((e for e in elements if e.tag == tag and _called(e) == name), None)
+
+
+def _called(element: Element) -> str:
+    return element.body if element.tag == "inertial" else element.name
+
+
+def attribute_span(text: str, element: Element, attribute: str) -> tuple[int, int] | None:
+    """Where the value of an attribute lies in the text, without its quotes; None where it is missing."""
+    for match in ATTRIBUTE.finditer(text, element.start, element.end):
+        if match.group(1) == attribute:
+            return match.span(2 if match.group(2) is not None else 3)
+    return None
+
+
+def tokens(text: str, element: Element, attribute: str) -> list[tuple[int, int, str]]:
+    """The numbers of an attribute as they are written: start, end, token. Empty where it is missing."""
+    span = attribute_span(text, element, attribute)
+    if span is None:
+        return []
+    return [(m.start(), m.end(), m.group()) for m in re.compile(r"\S+").finditer(text, *span)]
+
+
+def replace_numbers(text: str, file: str, changes: list[Edit], elements: list[Element] | None = None) -> str:
+    """Replace numbers in attributes; a number that already has its value keeps its digits.
+
+    Parameters
+    ----------
+    text, file
+        The MJCF and the name under which errors speak of it.
+    changes
+        What to write. A geom that is not there is passed over, since geoms are for the eye only. Values are written so
+        that they read back bit-equal.
+    elements
+        What `scan` found in *text*, where it is known already.
+
+    Raises
+    ------
+    ModelError
+        An element or attribute that is missing, or has too few numbers.
+    """
+    elements = scan(text, file) if elements is None else elements
+    edits: dict[tuple[int, int], str] = {}
+    for change in changes:
+        element = find(elements, change.tag, change.name)
+        label = element_label(change.tag, change.name)
+        if element is None:
+            if change.tag == "geom":
+                continue
+            raise ModelError(f"{file}: {label} is missing", file=file, element=change.name)
+        found = tokens(text, element, change.attribute)
+        if change.index >= len(found):
+            if change.tag == "geom":
+                continue
+            wrong = f"lacks number {change.index + 1}" if found else "is not written"
+            raise ModelError(
+                f"{file}:{element.line}: {label}: {change.attribute} {wrong}; write it out to make it editable",
+                file=file,
+                element=change.name,
+                attribute=change.attribute,
+            )
+        start, end, old = found[change.index]
+        if "&" in old:
+            raise ModelError(
+                f"{file}:{element.line}: {label}: attribute {change.attribute} holds the character reference {old};"
+                " write plain digits to make it editable",
+                file=file,
+            )
+        if change.token or not _holds(old, change.value):
+            edits[start, end] = change.token or number(change.value)
+    for (start, end), token in sorted(edits.items(), reverse=True):
+        text = text[:start] + token + text[end:]
+    return text
+
+
+def _holds(token: str, value: float) -> bool:
+    try:
+        return float(token) == value and significant_digits(token) <= PLAIN_DIGITS
+    except ValueError:
+        return False
+
+
+def element_label(tag: str, name: str) -> str:
+    """How messages speak of an element."""
+    if tag == "inertial":
+        return f'<inertial> of body "{name}"'
+    return f'<{tag} name="{name}">' if name else f"<{tag}>"
+
+
+def significant_digits(token: str) -> int:
+    """Number of digits of a decimal number from its first one that is not zero."""
+    mantissa = re.split("[eE]", token.lstrip("+-"))[0].replace(".", "")
+    return len(mantissa.lstrip("0"))
+
+
+def number(value: float) -> str:
+    """Return the shortest text that reads back bit-equal (zero without a sign)."""
+    if value == 0:
+        return "0"
+    return f"{value:.0f}" if value == int(value) and abs(value) < 1e15 else repr(value)

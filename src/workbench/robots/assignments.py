@@ -1,0 +1,85 @@
+"""Changes of parameters as a user writes them: ``a2=0.31``, ``a2_left*=1.1``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from workbench.errors import ParameterError
+from workbench.robots.parameters import expand_names, stored_names
+
+if TYPE_CHECKING:
+    from workbench.robots.base import Mechanism
+
+ASSIGNMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*([*/+-]?=)\s*(\S+)\s*")
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+OPERATIONS = {
+    "=": lambda old, number: number,
+    "*=": lambda old, number: old * number,
+    "/=": lambda old, number: old / number,
+    "+=": lambda old, number: old + number,
+    "-=": lambda old, number: old - number,
+}
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """One change as a user writes it: ``a2=0.31``, ``a2_left*=1.1``."""
+
+    name: str
+    operator: str
+    number: float
+
+
+def parse_assignment(text: str) -> Assignment:
+    """Read ``NAME=VALUE``, ``NAME*=FACTOR``, and the like with ``/=``, ``+=``, ``-=``.
+
+    Raises
+    ------
+    ParameterError
+        One line that says what is wrong and what is allowed.
+    """
+    match = ASSIGNMENT.fullmatch(text)
+    if match is None:
+        raise ParameterError(f'"{text}" is no change of a parameter; allowed: NAME=VALUE, NAME*=FACTOR, /=, +=, -=')
+    name, operator, value = match.groups()
+    number = float(value) if NUMBER.fullmatch(value) else float("nan")
+    if not abs(number) < float("inf"):
+        raise ParameterError(f'parameter {name}: "{value}" is not a finite number, SI without unit', parameter=name)
+    if operator == "/=" and number == 0:
+        raise ParameterError(f"parameter {name}: {text.strip()} divides by zero", parameter=name)
+    return Assignment(name, operator, number)
+
+
+def resolve_changes(
+    mechanism: type[Mechanism], values: Mapping[str, float], changes: Sequence[str]
+) -> dict[str, float]:
+    """Turn changes as a user writes them into new values by stored name (``a2_left``).
+
+    Parameters
+    ----------
+    mechanism, values
+        What the model describes, and its parameters as they stand.
+    changes
+        Each as for `parse_assignment`. ``NAME`` of a sided parameter changes both limbs, each from its own value; where
+        ``NAME_left`` or ``NAME_right`` is given too, that limb follows it.
+
+    Raises
+    ------
+    ParameterError
+        Unknown name, the same name twice, or not a change.
+    """
+    stored = stored_names(mechanism.parameter_table)
+    parsed = [parse_assignment(text) for text in changes]
+    seen: set[str] = set()
+    result: dict[str, float] = {}
+    for change in sorted(parsed, key=lambda c: c.name in stored):
+        if change.name in seen:
+            raise ParameterError(f"parameter {change.name} is given twice", parameter=change.name)
+        seen.add(change.name)
+        names = expand_names(mechanism.parameter_table, {change.name: 0.0})
+        for name in names:
+            result[name] = OPERATIONS[change.operator](values[name], change.number) + 0.0
+    return result

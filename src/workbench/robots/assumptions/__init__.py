@@ -1,0 +1,1 @@
+"""What a closed form takes for granted about a model, checked on the compiled numbers."""

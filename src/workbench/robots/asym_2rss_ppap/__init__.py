@@ -1,0 +1,1 @@
+"""The asymmetric 2RSS+PPaP pick-and-place robot of [Almeida2010]."""

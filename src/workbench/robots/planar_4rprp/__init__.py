@@ -1,0 +1,1 @@
+"""The 4-RPRP translational robot of [GarciaMurillo2016]."""

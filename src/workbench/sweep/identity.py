@@ -1,0 +1,83 @@
+"""What determines a case's numbers, as a hash: a finished case is taken over only where all of it is the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from workbench.campaign import provenance
+from workbench.campaign.cases import locate
+from workbench.campaign.evidence import Effort
+from workbench.campaign.spec import Campaign
+from workbench.campaign.user_candidates import UserCandidate
+
+FORMAT = 1
+"""Version of the files of a sweep and of its keys."""
+
+CODE = ("mjcf", "robots", "motion", "reference", "campaign", "sweep", "metrics.py", "arrays.py", "dry_friction.py")
+"""The workbench's own code that makes numbers: two states of it may carry the same version number."""
+
+DESCRIBING = ("name", "title", "description")
+
+
+@lru_cache(maxsize=1)
+def code_hash() -> str:
+    """Hash of the workbench's sources that make numbers."""
+    root = Path(provenance.__file__).resolve().parents[1]
+    digest = hashlib.sha256()
+    for pattern in CODE:
+        for found in sorted(root.glob(pattern)):
+            for path in sorted(found.rglob("*.py")) if found.is_dir() else [found]:
+                digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def versions() -> dict[str, str]:
+    """Versions that results may not be mixed across."""
+    return {"format": str(FORMAT), **provenance.versions(), "code": code_hash()}
+
+
+def common_key(
+    campaign: Campaign,
+    file: Path,
+    model: Path,
+    settings: Mapping[str, float],
+    effort: Effort,
+    keep_series: str,
+    users: Sequence[UserCandidate] = (),
+) -> str:
+    """Hash of everything that the cases of a sweep share."""
+    motion = campaign.case[0].motion
+    table = provenance.sha256(locate(file, motion.file, "motion.file").read_bytes()) if motion.kind == "csv" else ""
+    filters = campaign.sweep.filter.model_dump() if campaign.sweep else {}
+    return _digest(
+        {
+            "versions": versions(),
+            "model": provenance.sha256(model.read_bytes()),
+            "table": table,
+            "candidates": [candidate.model_dump(exclude={"printed_cost"}) for candidate in campaign.candidate],
+            "parameters": campaign.parameters,
+            "settings": dict(settings),
+            "engines": list(effort.engines),
+            "budget": effort.budget,
+            "filter": filters,
+            "keep_series": keep_series,
+            "setup": repr(campaign.setup),
+            "read": campaign.read,
+            "users": {user.name: provenance.sha256(user.file.read_bytes()) for user in users},
+        }
+    )
+
+
+def case_key(common: str, case: Mapping[str, Any]) -> str:
+    """Hash of one case; its name and texts determine no number and are left out."""
+    return _digest({"common": common, **{k: v for k, v in case.items() if k not in DESCRIBING}})
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]

@@ -1,0 +1,151 @@
+"""The journal of a running sweep: one line per finished case, appended in whatever order cases finish.
+
+A line counts when its checksum fits, so a torn end costs the cases in it and nothing else. Only the places of the lines
+are held in memory.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from workbench.sweep.record import STATUSES, Record, parse_line
+
+NAME = "journal.jsonl"
+LONGEST_LINE = 4_000_000
+ABSENT = -1
+
+
+class Journal:
+    """An append-only file of records; the last record of a case counts.
+
+    Parameters
+    ----------
+    path
+        The file; made where it is missing.
+    count
+        Number of cases of the sweep; records of others are ignored.
+
+    Raises
+    ------
+    OSError
+        It cannot be read or written.
+    """
+
+    def __init__(self, path: Path, count: int) -> None:
+        self._places = np.full(count, ABSENT, dtype=np.int64)
+        self._statuses = np.full(count, ABSENT, dtype=np.int8)
+        self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        self._end = 0
+        try:
+            self._scan()
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """Return the journal."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the file."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+    def _scan(self) -> None:
+        with open(os.dup(self._descriptor), "rb") as stream:
+            stream.seek(0)
+            while line := stream.readline(LONGEST_LINE):
+                if line.endswith(b"\n"):
+                    record = parse_line(line)
+                    if record is not None and 0 <= record.index < len(self._places):
+                        self._note(record, self._end)
+                    self._end += len(line)
+                elif len(line) == LONGEST_LINE:
+                    self._end += len(line)
+        # a torn last line goes, so that the next one starts afresh
+        if os.fstat(self._descriptor).st_size > self._end:
+            os.ftruncate(self._descriptor, self._end)
+
+    def _note(self, record: Record, place: int) -> None:
+        self._places[record.index] = place
+        self._statuses[record.index] = STATUSES.index(record.status)
+
+    def append(self, record: Record) -> None:
+        """Add a finished case; what a full disk leaves of it is taken back.
+
+        Raises
+        ------
+        OSError
+            The system refuses the write.
+        """
+        line = record.line()
+        try:
+            written = 0
+            while written < len(line):
+                written += os.pwrite(self._descriptor, line[written:], self._end + written)
+        except OSError:
+            os.ftruncate(self._descriptor, self._end)
+            raise
+        self._note(record, self._end)
+        self._end += len(line)
+
+    def sync(self) -> None:
+        """Make sure that all of it survives a power cut."""
+        os.fsync(self._descriptor)
+
+    def __contains__(self, index: int) -> bool:
+        return bool(self._places[index] != ABSENT)
+
+    def status(self, index: int) -> str | None:
+        """Status of a case; None where it is not finished."""
+        found = int(self._statuses[index])
+        return None if found == ABSENT else STATUSES[found]
+
+    def counts(self) -> dict[str, int]:
+        """Finished cases by status."""
+        return {status: int(np.count_nonzero(self._statuses == i)) for i, status in enumerate(STATUSES)}
+
+    def missing(self) -> Iterator[int]:
+        """Indices of the cases that are not finished, in order, as they stand now."""
+        return iter(np.flatnonzero(self._places == ABSENT).tolist())
+
+    def forget(self, index: int) -> None:
+        """Count a case as not finished."""
+        self._places[index] = self._statuses[index] = ABSENT
+
+    def read(self, index: int) -> Record:
+        """Return the record of a finished case.
+
+        Raises
+        ------
+        KeyError
+            It is not finished.
+        OSError
+            The file was changed by others.
+        """
+        place = int(self._places[index])
+        if place == ABSENT:
+            raise KeyError(index)
+        line = b""
+        while not line.endswith(b"\n"):
+            piece = os.pread(self._descriptor, 16384, place + len(line))
+            if not piece:
+                break
+            line = (line + piece).split(b"\n", 1)[0] + (b"\n" if b"\n" in piece else b"")
+        record = parse_line(line)
+        if record is None:
+            raise OSError(f"case {index} cannot be read back; was the file changed while it was in use?")
+        return record
