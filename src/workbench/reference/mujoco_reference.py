@@ -20,7 +20,8 @@ from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf.compile import custom_text
 from workbench.mjcf.setup import Setup
-from workbench.reference.closure import Assembly, LoopCloser
+from workbench.reference.closure import LoopCloser
+from workbench.reference.continuation import Assembly
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
 from workbench.reference.freedoms import check_freedoms
 from workbench.reference.kernels import projection, velocities
