@@ -47,6 +47,12 @@ class ReferenceResult:
     """``(n, 3)`` platform position, m"""
     xd: FloatArray
     xdd: FloatArray
+    rotation: FloatArray
+    """``(n, 3, 3)`` of the platform site: vector in the base's frame = rotation @ vector in the site's frame"""
+    omega: FloatArray
+    """``(n, 3)`` angular velocity of the platform, rad/s"""
+    alpha: FloatArray
+    """``(n, 3)`` angular acceleration of the platform, rad/s^2"""
     reactions: dict[str, FloatArray]
     """force ``(n, 3)`` in N, base frame, that the parent exerts on the child body at each joint, and that the second
     site's body exerts on the first's at each loop closure; none where there are more actuators than freedoms"""
@@ -234,6 +240,7 @@ class MujocoReference:
         model, assembly = engine.model, self._assemble(q)
         qpos, (qvel, qacc) = assembly.qpos, np.zeros((2, n, model.nv))
         tau, motion, energy = np.zeros_like(q), np.zeros((3, n, 3)), np.zeros((n, 2))
+        turning = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         velocity_residual, acceleration_residual = np.zeros((2, n))
         # the kernel fills a row for every body, also for fixed ones that follow the last joint
         reactions = np.zeros((len(structure.blocks) + model.nbody, n, 3))
@@ -248,7 +255,7 @@ class MujocoReference:
                 *self._tables, poses.tables, dynamics.tables, self._mass_layout, platform, masses, gravity,
                 self._base_rotation, self._base_position, qpos[rows], qvel[rows], assembly.tangent[rows], qdd[rows],
                 force[rows], qacc[rows], tau[rows], velocity_residual[rows], acceleration_residual[rows],
-                motion[:, rows], reactions[:, rows],
+                motion[:, rows], (turning[0][rows], turning[1][rows], turning[2][rows]), reactions[:, rows],
             )  # fmt: skip
             energy[rows] = dynamics.energy[: rows.stop - rows.start]
 
@@ -257,7 +264,8 @@ class MujocoReference:
         # in MuJoCo dry friction is a constraint, so neither bias nor passive forces hold it
         tau += model.dof_frictionloss[structure.actuated] * direction(qd)
         return ReferenceResult(
-            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], reactions=named(self._reaction_rows, reactions),
+            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], rotation=turning[0], omega=turning[1],
+            alpha=turning[2], reactions=named(self._reaction_rows, reactions),
             closure_residual=assembly.residual.copy(), velocity_residual=velocity_residual,
             acceleration_residual=acceleration_residual, rank=assembly.rank.copy(),
             condition=assembly.condition.copy(), energy=energy, qpos=qpos.copy(), qvel=qvel, qacc=qacc,
