@@ -148,8 +148,8 @@ def projection(  # type: ignore[no-untyped-def]
 
     With W the tangent (J W = 0), tau = W^T (M qacc + bias - applied): the constraint forces do no work along W. Their
     least-norm values come from the same factor as qacc and are the loop reactions. ``mass`` holds M's lower triangle.
-    ``motion (3, n, 3)`` receives x, xd, xdd; ``turning``, three arrays, the platform site's rotation ``(n, 3, 3)`` and its
-    angular velocity and acceleration ``(n, 3)``; ``reactions (loops + joints, n, 3)`` forces, both in the base's frame.
+    ``motion (3, n, 3)`` receives x, xd, xdd; ``turning``, three arrays, the platform site's rotation ``(n, 3, 3)``, its
+    angular velocity and acceleration ``(n, 3)``; ``reactions (loops + joints, n, 3)`` forces; all in the base's frame.
     """
     cdof, com, site_xpos, site_xquat, anchors = poses
     cdof_dot, mass, bias, damping, body_com = dynamics

@@ -25,6 +25,8 @@ from workbench.reference.continuation import Assembly
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
 from workbench.reference.freedoms import check_freedoms
 from workbench.reference.kernels import projection, velocities
+from workbench.reference.platform_closure import PlatformCloser
+from workbench.reference.platform_side import PlatformSide
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
 from workbench.reference.structure import Structure, read_structure
@@ -85,7 +87,7 @@ class Mobility:
     """spins of rods between two spherical joints about their own axes"""
 
 
-class MujocoReference:
+class MujocoReference(PlatformSide):
     """Closed-chain inverse dynamics of an MJCF model.
 
     Parameters
@@ -131,6 +133,7 @@ class MujocoReference:
         self._reaction_rows = reaction_rows(loaded.model, self._structure)
         self._leader: tuple[MujocoReference, np.ndarray] | None = None
         self._closed: tuple[FloatArray, Assembly] | None = None
+        self._platform: dict[tuple[str, ...], PlatformCloser] = {}
         self._base_rotation = np.eye(3)
         self._locate_base()
         self._check_freedoms()
@@ -343,7 +346,7 @@ class MujocoReference:
     def _led_by(self, structure: Structure) -> MujocoReference:
         """The same model, driven by fewer of its actuators."""
         led = copy.copy(self)
-        led._structure, led._leader, led._closed = structure, None, None
+        led._structure, led._leader, led._closed, led._platform = structure, None, None, {}
         led._closer = LoopCloser(self._engines["distributed"], structure)
         tables = led._closer.tables
         led._tables = tables.closures, tables.joints, tables.split, tables.bodies

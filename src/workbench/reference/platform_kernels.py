@@ -152,7 +152,7 @@ def platform_accelerations(  # type: ignore[no-untyped-def]
 
 @compiled
 def platform_jacobian(task, base, closures, poses, aim, rows, values):  # type: ignore[no-untyped-def]
-    """Fill ``rows (n, m, nv)``, the Jacobian of the task coordinates, and their ``values (n, m)`` nearest to ``aim``."""
+    """Fill ``rows (n, m, nv)``, the task coordinates' Jacobian, and their ``values (n, m)`` nearest to ``aim``."""
     cdof, com, site_xpos, site_xquat, _anchors = poses
     _blocks, _block_rows, _polynomials, root, moving, depth = closures
     rise, still = np.empty(aim.shape[1]), np.zeros(3)

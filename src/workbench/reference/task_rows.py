@@ -105,7 +105,7 @@ def _rotation_vector(axes, quaternion, aim, omega, values, rates, rise):  # type
 
 @inlined
 def _coefficients(angle):  # type: ignore[no-untyped-def]
-    """c = (1 - a/2 cot a/2) / a^2 of an angle a, and c'/a."""
+    """Of an angle a: c = (1 - a/2 cot a/2) / a^2, and c'/a."""
     s = angle * angle
     if s < SERIES * SERIES:
         c = 1 / 12 + s * (1 / 720 + s * (1 / 30240 + s * (1 / 1209600 + s * (1 / 47900160 + s * 691 / 1307674368000))))
