@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.robots.load import load_mechanism
+from workbench.capabilities.robot import load_robot as load_mechanism
 from workbench.robots.planar_4rprp.closed_form import Planar4Rprp
 
 MODEL = str(Path(__file__).resolve().parents[1] / "models" / "planar_4rprp.xml")

@@ -9,6 +9,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from workbench.robots.planar_4rprp.parameters import Parameters
 
 from planar_4rprp_cases import (
     DIFFERENCES,
@@ -25,12 +26,11 @@ from planar_4rprp_cases import (
     second_rate,
     slow,
 )
+from workbench.capabilities.robot import load_robot as load_mechanism
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.robots import screws
-from workbench.robots.load import load_mechanism
 from workbench.robots.planar_4rprp import screws as screw_route
 from workbench.robots.planar_4rprp.closed_form import HOME_SOLUTION, Planar4Rprp
-from workbench.robots.planar_4rprp.parameters import Parameters
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,10 @@ from planar_4rprp_cases import (
     random_parameters,
     scattered,
 )
+from workbench.capabilities.robot import load_robot as load_mechanism
 from workbench.errors import MotionError, ParameterError
 from workbench.reference.mujoco_reference import MujocoReference
-from workbench.robots.load import load_mechanism, load_model
+from workbench.robots.load import load_model
 from workbench.robots.planar_4rprp.closed_form import Planar4Rprp
 from workbench.robots.planar_4rprp.mobility import gogu_mobility, loop_matrix
 from workbench.robots.planar_4rprp.singularity import PaperCondition, paper_singularity_conditions, parallelism

@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
-from workbench.campaign.own_mechanism import OwnMechanism
+from workbench.campaign.robot_spec import RobotKeys
 from workbench.campaign.sweep_spec import Filter, SweepSpec, Vary
 from workbench.data_files import bundled
 from workbench.documents import Form, read_toml, shorten
@@ -150,14 +150,13 @@ class ClaimSpec(Strict):
     note: str = ""
 
 
-class Campaign(OwnMechanism):
+class Campaign(RobotKeys):
     """A whole campaign file."""
 
     format: Literal[1] = 1
     name: Name
     title: str
     description: str = ""
-    model: str
     parameters: dict[str, Finite] = Field(default_factory=dict)
     candidate: list[CandidateSpec] = Field(default_factory=list)
     """may be empty where the campaign brings its own mechanism: then the reference alone is computed"""
@@ -231,7 +230,7 @@ FORM = Form(
 
 def _check_names(campaign: Campaign, file: str) -> None:
     """Names that have to be unique, and names that have to exist."""
-    if not campaign.candidate and campaign.actuated is None:
+    if not campaign.candidate and campaign.actuated is None and campaign.robot is None:
         raise SpecError(f"{file}: candidate: missing; a campaign compares at least one", file=file)
     cases = [case.name for case in campaign.case]
     for name in cases:

@@ -9,13 +9,12 @@ import mujoco
 
 from workbench.errors import SpecError
 from workbench.mjcf.compile import custom_text
-from workbench.mjcf.setup import Setup
 from workbench.robots.description import Description
 from workbench.robots.load import LoadedModel
 from workbench.robots.robot_file import PlatformSpec, RobotFile, RobotSpec
 
 
-def robot_of_model(loaded: LoadedModel, setup: Setup | None) -> LoadedModel:
+def robot_of_model(loaded: LoadedModel) -> LoadedModel:
     """Return a loaded model with the description that its own names give; it has no parameters.
 
     Raises
@@ -41,7 +40,7 @@ def robot_of_model(loaded: LoadedModel, setup: Setup | None) -> LoadedModel:
         name="".join(c if c.isalnum() or c in "_.+-" else "_" for c in stem)[:100] or "robot",
         title=stem.replace("_", " "),
         model=Path(file).name,
-        actuated=list(setup.actuated) if setup else joints,
+        actuated=joints,
         platform=PlatformSpec(site=platform),
         base=custom_text(model, "base_body") or "world",
         lumped=(custom_text(model, "lumped_bodies") or "").split(),

@@ -26,7 +26,7 @@ MARGIN = 0.1
 
 
 def coordinate_limits(description: Description, model: mujoco.MjModel) -> tuple[tuple[float, float], ...]:
-    """Range of each actuated coordinate, m or rad: of the robot file, of the model's joint, or as far as one may look."""
+    """Range of each actuated coordinate, m or rad: the robot file's, the joint's, or as far as one may look."""
     found = []
     for joint in description.joints:
         given = description.robot.spec.limits.get(joint)
@@ -56,14 +56,11 @@ def reach_box(robot: Robot) -> tuple[FloatArray, FloatArray]:
 
     low, high = np.array(robot.joint_limits).T
     probes = low + (high - low) * qmc.Sobol(len(low), rng=np.random.default_rng(0)).random(PROBES)
-    reached = []
-    for q in probes:
-        try:
-            reached.append(robot.forward_kinematics(q[None, :])[0])
-        except MotionError:
-            continue
-    if not reached:
-        raise MotionError(f"{robot.name}: no pose within the joints' limits can be assembled; give limits in the robot file")
-    points = np.array(reached)
+    probes = probes[robot.reference.assemblable(probes)]
+    if not len(probes):
+        raise MotionError(
+            f"{robot.name}: no pose within the joints' limits can be assembled; give limits in the robot file"
+        )
+    points = robot.forward_kinematics(probes)
     wide = MARGIN * np.ptp(points, axis=0)
     return points.min(axis=0) - wide, points.max(axis=0) + wide

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from workbench.arrays import FloatArray, as_batches
+from workbench.arrays import FloatArray, as_batch
 from workbench.capabilities.defaults import robot_of_model
 from workbench.capabilities.limits import coordinate_limits, reach_box
 from workbench.capabilities.samples import one_or_many
@@ -24,15 +24,14 @@ from workbench.capabilities.warnings import (
     refuse_degrees,
 )
 from workbench.errors import ParameterError
-from workbench.mjcf.setup import Setup
-from workbench.reference import MujocoReference, ReferenceResult
+from workbench.reference import MujocoReference
 from workbench.robots.closed_form import Candidate, ClosedForm, Condition, Reach
 from workbench.robots.description import Description
 from workbench.robots.kernel_call import TorqueKernel
 from workbench.robots.load import Base, LoadedModel, read_base, with_overrides
 from workbench.robots.robot_file import RobotFile
 
-__all__ = ["Robot", "load_robot"]
+__all__ = ["Robot", "load_robot", "robot_with"]
 
 
 class Robot:
@@ -48,7 +47,7 @@ class Robot:
         base: Base,
         values: Mapping[str, float] | None = None,
         loaded: LoadedModel | None = None,
-        closed_form: type[ClosedForm] | None = None,
+        kind: type[ClosedForm] | None = None,
     ) -> None:
         described = base.loaded.description
         assert described is not None
@@ -56,7 +55,7 @@ class Robot:
         self._loaded = loaded
         self._description: Description = described
         self._values: dict[str, float] = dict(values if values is not None else base.loaded.values or {})
-        self._kind = closed_form or described.closed_form
+        self._kind = kind or described.closed_form
         self._extra: ChainMap[str, Candidate] | None = None
 
     def __repr__(self) -> str:
@@ -113,13 +112,13 @@ class Robot:
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Task coordinates: some of ``x y z rx ry rz``."""
-        return tuple(self._description.robot.spec.platform.coordinates)
+        return self._description.robot.spec.platform.task
 
     @property
     def platform_axes(self) -> tuple[str, ...]:
         """Names of the task coordinates as the robot's source writes them."""
         platform = self._description.robot.spec.platform
-        return tuple(platform.names or platform.coordinates)
+        return tuple(platform.names or platform.task)
 
     @property
     def task_units(self) -> tuple[str, ...]:
@@ -154,6 +153,11 @@ class Robot:
     def parameters(self) -> Any:
         """The frozen dataclass of parameters, SI."""
         return self._description.parameter_type(**self._values)
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """The parameters by name, SI."""
+        return dict(self._values)
 
     def with_parameters(self, **changes: float) -> Robot:
         """Return a new robot with some parameters changed.
@@ -193,6 +197,11 @@ class Robot:
             self._loaded = self._base.loaded if same else with_overrides(self._base, self._values)
         return self._loaded
 
+    @property
+    def home(self) -> FloatArray:
+        """Actuated coordinates ``(na,)`` of the closed home pose."""
+        return self.reference.home
+
     @cached_property
     def reference(self) -> MujocoReference:
         """MuJoCo's side of every comparison, with these parameters."""
@@ -213,7 +222,7 @@ class Robot:
     def candidates(self) -> Mapping[str, Candidate]:
         """Formulas by name, a user's included where they were offered."""
         own: Mapping[str, Candidate] = self._kind.candidates if self._kind else {}
-        return own if self._extra is None else _Offered(self._extra, own)
+        return own if self._extra is None else _Offered(self._extra, own)  # type: ignore[arg-type]
 
     def offer(self, candidates: Mapping[str, Candidate]) -> None:
         """Add candidates to those of this robot, and of robots made from it."""
@@ -221,25 +230,29 @@ class Robot:
 
     # kinematics
 
-    def _solve(self, q: ArrayLike, qd: ArrayLike | None = None, qdd: ArrayLike | None = None) -> ReferenceResult:
-        (q,) = as_batches(len(self.joints), q=q)
-        refuse_degrees(self, q)
-        zero = np.zeros_like(q)
-        return self.reference.inverse_dynamics(q, zero if qd is None else qd, zero if qdd is None else qdd)
+    def _checked(self, q: ArrayLike) -> FloatArray:
+        array = as_batch("q", q, len(self.joints))
+        refuse_degrees(self, array)
+        return array
+
+    def _at_rest(self, q: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        array = self._checked(q)
+        return array, np.zeros_like(array), np.zeros_like(array)
 
     @one_or_many(1)
     def forward_kinematics(self, q: ArrayLike) -> FloatArray:
         """Task coordinates ``(n, m)`` from actuated coordinates ``(n, na)``, on the home branch."""
         own = self._own("forward_kinematics")
-        return own(q) if own else self.reference.task_motion(self._solve(q), self.coordinates)[0]
+        return own(q) if own else self.reference.platform_motion(*self._at_rest(q), self.coordinates)[0]
 
     @one_or_many(3)
     def platform_motion(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Task coordinates, their rates and accelerations, each ``(n, m)``."""
         own = self._own("platform_motion")
         if own:
-            return own(q, qd, qdd)
-        return self.reference.task_motion(self._solve(q, qd, qdd), self.coordinates)
+            moved: tuple[FloatArray, FloatArray, FloatArray] = own(q, qd, qdd)
+            return moved
+        return self.reference.platform_motion(self._checked(q), qd, qdd, self.coordinates)
 
     @one_or_many(1)
     def jacobian(self, q: ArrayLike) -> FloatArray:
@@ -265,19 +278,42 @@ class Robot:
         if own:
             found: Reach = own(x)
             return found
-        q, reachable, condition = self.reference.reach(x, self.coordinates)
-        return Reach(q, reachable, {}, condition)
+        seen = self.reference.reach(x, self.coordinates)
+        return Reach(seen.q, seen.reachable, seen.measures, seen.condition)
 
     def reach_box(self) -> tuple[FloatArray, FloatArray]:
         """Corners ``(m,)`` of a box in task coordinates that holds what the joints' limits let the platform reach."""
         own = self._own("reach_box")
-        return own() if own else reach_box(self)
+        return own(self.joint_limits) if own else reach_box(self)
 
     @one_or_many(1)
     def singularity_measures(self, q: ArrayLike) -> dict[str, FloatArray]:
         """Numbers that vanish at singular poses, name -> ``(n,)``, dimensionless, 1 far away."""
         own = self._own("singularity_measures")
-        return own(q) if own else self.reference.singularity_measures(q, self.coordinates)
+        if own:
+            found: dict[str, FloatArray] = own(q)
+            return found
+        return self.reference.singularity_measures(q, self.coordinates) if self.has_task else {}
+
+    @cached_property
+    def has_task(self) -> bool:
+        """Whether the task coordinates are as many as the freedoms, so that they say where the robot is.
+
+        Raises
+        ------
+        ParameterError
+            The robot file states coordinates that the robot does not have.
+        """
+        if self._own("inverse_kinematics"):
+            return True
+        try:
+            self.reference.check_coordinates(self.coordinates)
+        except ParameterError as error:
+            robot = self._description.robot
+            if robot.spec.platform.coordinates is None:
+                return False
+            raise ParameterError(f"{robot.shown}: platform.coordinates: {error}", **error.facts) from error
+        return True
 
     def assembly_solutions(self, q: ArrayLike) -> FloatArray:
         """Task coordinates of every assembly branch that is known, ``(n, k, m)``; at least the home branch."""
@@ -313,7 +349,8 @@ class Robot:
         """Inverse dynamics on arrays of checked shape, without what `friction` holds; force ``(n, 3)``."""
         own = self._own("torques")
         if own:
-            return own(q, qd, qdd, mass_model, external_force, threads)
+            found: FloatArray = own(q, qd, qdd, mass_model, external_force, threads)
+            return found
         return self.reference.inverse_dynamics(q, qd, qdd, mass_model, external_force).tau
 
     @property
@@ -391,24 +428,28 @@ class _Offered(ChainMap[str, Candidate]):
         return getattr(self.maps[1], "on_purpose", ())
 
 
-def load_robot(
-    path: str | Path,
-    *,
-    setup: Setup | None = None,
-    robot: RobotFile | None = None,
-    closed_form: type[ClosedForm] | None = None,
-    **parameters: float,
-) -> Robot:
-    """Load a robot.
+def robot_with(path: str | Path, parameters: Mapping[str, float], robot: RobotFile | None = None) -> Robot:
+    """Load a robot with parameters changed; *robot* describes it, where another description than its own counts.
+
+    Raises
+    ------
+    ModelError, ParameterError, SpecError
+        See `load_robot`.
+    """
+    base = read_base(path, robot=robot)
+    if base.loaded.description is None:
+        base = dataclasses.replace(base, loaded=robot_of_model(base.loaded))
+    loaded = with_overrides(base, parameters)
+    return Robot(base, loaded.values, loaded)
+
+
+def load_robot(path: str | Path, **parameters: float) -> Robot:
+    """Load a robot; nothing of its folder is run.
 
     Parameters
     ----------
     path
-        A folder with a robot file, the robot file, an MJCF, ``models/NAME.xml``, or the name of a robot that comes along.
-    setup, robot
-        What describes an MJCF, where another description than its own counts.
-    closed_form
-        Kinematics and dynamics of the user's own; a robot file's own Python files are never run by loading it.
+        A folder with a robot file, the robot file, an MJCF, ``models/NAME.xml``, or a name of a robot that comes along.
     **parameters
         Changes by name, SI: ``payload=0.5``, ``a2_left=0.31``.
 
@@ -417,8 +458,4 @@ def load_robot(
     ModelError, ParameterError, SpecError
         See `workbench.robots.load.load_model`.
     """
-    base = read_base(path, setup, robot)
-    if base.loaded.description is None:
-        base = dataclasses.replace(base, loaded=robot_of_model(base.loaded, setup))
-    loaded = with_overrides(base, parameters)
-    return Robot(base, loaded.values, loaded, closed_form)
+    return robot_with(path, parameters)

@@ -144,6 +144,12 @@ class MujocoReference(PlatformSide):
         return self._structure.joint_names
 
     @property
+    def home(self) -> FloatArray:
+        """Actuated coordinates ``(na,)`` of the closed home pose, m and rad."""
+        home: FloatArray = self._closer.home[self._structure.actuated_qpos].copy()
+        return home
+
+    @property
     def actuated_slides(self) -> tuple[bool, ...]:
         """Which actuated joints slide; the others turn."""
         model = self._engines["distributed"].model

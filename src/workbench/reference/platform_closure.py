@@ -246,8 +246,7 @@ class PlatformCloser(Continuation):
 
 def _least(matrices: FloatArray) -> FloatArray:
     """Least singular value ``(n,)`` of each matrix ``(n, a, b)``, a >= b."""
-    values: FloatArray = np.linalg.svd(matrices, compute_uv=False)[:, -1]
-    return values
+    return np.asarray(np.linalg.svd(matrices, compute_uv=False)[:, -1], dtype=np.float64)
 
 
 def _size(data: mujoco.MjData, site: int) -> float:

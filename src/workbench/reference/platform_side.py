@@ -133,6 +133,13 @@ class PlatformSide(ABC):
         q[~reachable] = np.nan
         return PlatformReach(q, reachable, measures, np.where(reachable, found.condition, np.nan))
 
+    def assemblable(self, q: ArrayLike) -> np.ndarray:
+        """Which of some actuated coordinates ``(n, na)`` a straight way from home leads to, past no singular pose."""
+        leader, columns = self.determining
+        return leader._closer.mark(
+            np.ascontiguousarray(as_batch("q", q, len(self._closer.structure.actuated))[:, columns])
+        )[1]
+
     def jacobian(self, q: ArrayLike, coordinates: Sequence[str] = POSITIONS) -> FloatArray:
         """Platform Jacobian ``(n, m, na)``, xd = J qd, at actuated coordinates ``(n, na)``.
 
@@ -173,6 +180,16 @@ class PlatformSide(ABC):
         found = self.inverse_dynamics(q, qd, qdd)
         position = found.x, found.xd, found.xdd
         return task_motion(task_of(coordinates), position, found.rotation, found.omega, found.alpha)
+
+    def check_coordinates(self, coordinates: Sequence[str]) -> None:
+        """Refuse task coordinates that do not say where the robot is.
+
+        Raises
+        ------
+        ParameterError
+            Coordinates that the robot does not have, too many or too few; with those that it has.
+        """
+        self._platform_closer(coordinates)
 
     def _platform_closer(self, coordinates: Sequence[str]) -> PlatformCloser:
         task = task_of(coordinates)

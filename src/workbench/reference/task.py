@@ -126,6 +126,16 @@ def continuous(task: Task, x: FloatArray) -> FloatArray:
     return unwrapped
 
 
+def rotation_vector(rotation: FloatArray) -> FloatArray:
+    """Axis times angle ``(n, 3)``, rad, of rotation matrices ``(n, 3, 3)``; the angle is at most half a turn."""
+    q = quaternions(rotation)
+    q = np.where(q[:, :1] < 0, -q, q)
+    sine = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[:, :1])
+    scale = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 0.0)
+    return np.asarray(scale * q[:, 1:])
+
+
 def quaternions(rotation: FloatArray) -> FloatArray:
     """Unit quaternions ``(n, 4)`` (w, x, y, z) of rotation matrices ``(n, 3, 3)``, each by its largest component."""
     r = rotation

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+import mujoco
+
 from workbench.errors import ModelError, SpecError, did_you_mean
 from workbench.mjcf.compile import custom_text, find_model
 from workbench.robots.robot_file import FILE, RobotFile, read_robot_file
@@ -97,7 +99,7 @@ def robot_beside(model: Path) -> RobotFile | None:
     return robot if robot.model.resolve() == model.resolve() else None
 
 
-def robot_named(model: object, file: str) -> RobotFile | None:
+def robot_named(model: mujoco.MjModel, file: str) -> RobotFile | None:
     """The robot of the package that a compiled model names in its ``<custom>``; None where it names none.
 
     Raises
@@ -105,7 +107,7 @@ def robot_named(model: object, file: str) -> RobotFile | None:
     ModelError
         It names one that does not exist.
     """
-    name = custom_text(model, NAMED)  # type: ignore[arg-type]
+    name = custom_text(model, NAMED)
     if name is None:
         return None
     if name not in bundled_robots():

@@ -71,7 +71,7 @@ class ClosedForm:
 
     ``forward_kinematics(q)``, ``platform_motion(q, qd, qdd)``, ``jacobian(q)``
         From actuated to task coordinates.
-    ``inverse_kinematics(x)``, ``joint_motion(x, xd, xdd)``, ``reach(x) -> Reach``, ``reach_box()``
+    ``inverse_kinematics(x)``, ``joint_motion(x, xd, xdd)``, ``reach(x) -> Reach``, ``reach_box(limits)``
         From task to actuated coordinates.
     ``torques(q, qd, qdd, mass_model, external_force, threads)``, ``kernel(mass_model)``
         Inverse dynamics of a batch without friction, and of single samples for control loops.

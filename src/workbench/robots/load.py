@@ -25,6 +25,7 @@ from workbench.robots.catalogue import Source, find_source, robot_beside, robot_
 from workbench.robots.closed_form import ClosedForm
 from workbench.robots.description import Description, describe
 from workbench.robots.inertia import refuse_impossible_bodies
+from workbench.robots.parameters import Target
 from workbench.robots.robot_file import RobotFile
 from workbench.robots.values import is_written, quotient, read_number, read_parameters, rewrite
 
@@ -154,7 +155,7 @@ class Base:
     """compiled from the user's own text"""
     elements: list[Element]
     setup: Setup | None
-    computed: Mapping[str, object]
+    computed: Mapping[str, Target]
     """parameters whose number does not stand in the file -> their place"""
 
 
@@ -272,7 +273,7 @@ def confirm(
     text: str,
     elements: list[Element],
     wanted: Mapping[str, float],
-    computed: Mapping[str, object],
+    computed: Mapping[str, Target],
 ) -> None:
     """Refuse an edited model that does not hold, bit for bit, the parameters that were asked for.
 

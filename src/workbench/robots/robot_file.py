@@ -26,7 +26,7 @@ from workbench.schema import Finite, Name, Strict
 
 FILE = "robot.toml"
 FORMAT = 1
-COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
+Coordinate = Literal["x", "y", "z", "rx", "ry", "rz"]
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,39}$")]
 Range = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 Ignorable = Literal["contacts", "limits", "springs", "tendons", "free bodies"]
@@ -39,20 +39,23 @@ class PlatformSpec(Strict):
     """What moves: a site, and the coordinates that a task is given in."""
 
     site: str
-    coordinates: Annotated[list[Literal["x", "y", "z", "rx", "ry", "rz"]], Field(min_length=1, max_length=6)] = Field(
-        default_factory=lambda: ["x", "y", "z"]
-    )
-    """task coordinates: positions (m) and angles (rad) in the base body's frame"""
+    coordinates: Annotated[list[Coordinate], Field(min_length=1, max_length=6)] | None = None
+    """task coordinates: positions (m) and angles (rad) in the base body's frame; x y z where not said"""
     names: list[str] | None = None
     """what the robot's source calls them; the coordinates themselves where not said"""
 
     @model_validator(mode="after")
     def _each_once(self) -> PlatformSpec:
-        if len(set(self.coordinates)) < len(self.coordinates):
+        if len(set(self.task)) < len(self.task):
             raise ValueError("each coordinate once")
-        if self.names is not None and len(self.names) != len(self.coordinates):
-            raise ValueError(f"{len(self.names)} names for {len(self.coordinates)} coordinates; one each")
+        if self.names is not None and len(self.names) != len(self.task):
+            raise ValueError(f"{len(self.names)} names for {len(self.task)} coordinates; one each")
         return self
+
+    @property
+    def task(self) -> tuple[str, ...]:
+        """The task coordinates."""
+        return tuple(self.coordinates or ("x", "y", "z"))
 
 
 class ParameterSpec(Strict):
@@ -128,6 +131,8 @@ class RobotFile:
     spec: RobotSpec
     builtin: bool = False
     """True: it comes with the package, and its formulas are the package's own"""
+    section: str = "parameters"
+    """where its parameters stand, for messages: ``read`` in a campaign"""
 
     def __eq__(self, other: object) -> bool:
         """Two robot files are the same where they say the same of the same folder."""
@@ -202,7 +207,7 @@ class RobotFile:
         """Every place that a parameter names, in the order of the file."""
         found: list[Target] = []
         for name, parameter in self.spec.parameters.items():
-            where = f"{self.shown}: parameters.{name}.at"
+            where = f"{self.shown}: {self._key(name, 'at')}"
             for number, text in enumerate(parameter.at):
                 target = parse_place(text, name, where)
                 if number == 0:
@@ -210,7 +215,7 @@ class RobotFile:
                         raise SpecError(f'{where} "{text}": the first place has to hold {name} once, to read it')
                     target = Target(**{**vars(target), "reads": name})
                 found.append(target)
-            where = f"{self.shown}: parameters.{name}.follows"
+            where = f"{self.shown}: {self._key(name, 'follows')}"
             found += [parse_place(text, name, where, optional=True) for text in parameter.follows]
         for target in found:
             for other in target.of:
@@ -238,12 +243,15 @@ class RobotFile:
             bars.append(Bar(bar.mass, names[1], bar.half_length is not None, tuple(bar.inertia), bar.centre))
         return ParameterTable(infos, {g: tuple(m) for g, m in spec.groups.items()}, tuple(bars))
 
+    def _key(self, name: str, key: str = "") -> str:
+        return f"read.{name}" if self.section == "read" else ".".join(["parameters", name, *([key] if key else [])])
+
     def _known(self, name: str, key: str) -> None:
         if name not in self.spec.parameters:
             raise SpecError(f'{self.shown}: {key}: no parameter "{name}"{did_you_mean(name, self.spec.parameters)}')
 
     def _info(self, name: str, parameter: ParameterSpec, target: Target) -> ParameterInfo:
-        where = f"{self.shown}: parameters.{name}"
+        where = f"{self.shown}: {self._key(name)}"
         if keyword.iskeyword(name) or name.startswith("__"):
             raise SpecError(
                 f"{where}: formulas read p.NAME, and this name cannot stand there; allowed: letters, digits and _, none"

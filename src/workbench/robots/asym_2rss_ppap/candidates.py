@@ -58,7 +58,8 @@ class Candidates(Mapping[str, Candidate]):
 
 def _of_mass_model(model: MassModel) -> Candidate:
     def torques(mech: Any, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> FloatArray:
-        return mech.torques(q, qd, qdd, model.name, force) + mech.friction(q, qd, qdd)
+        tau: FloatArray = mech.torques(q, qd, qdd, model.name, force) + mech.friction(q, qd, qdd)
+        return tau
 
     return Candidate(
         name=model.name,
@@ -87,7 +88,8 @@ def _literal(
             external_force=external_force,
             misprints=misprints,
         )
-        return result + mech.friction(q, qd, qdd)
+        friction: FloatArray = mech.friction(q, qd, qdd)
+        return result + friction
 
     return Candidate(name, mass_model, torques, description, source)
 

@@ -117,7 +117,7 @@ class Asym2rssPpap(ClosedForm):
         measures = {name: np.where(reachable, value, np.nan) for name, value in self._scaled(determinants).items()}
         return Reach(q, reachable, measures, condition)
 
-    def reach_box(self) -> tuple[FloatArray, FloatArray]:
+    def reach_box(self, limits: tuple[tuple[float, float], ...]) -> tuple[FloatArray, FloatArray]:
         """Box that holds the workspace; see `ClosedForm.reach_box`."""
         p = self._parameters
         along = min(p.a2_left, p.a2_right)

@@ -119,9 +119,9 @@ class Planar4Rprp(ClosedForm):
         measures = {name: np.where(reachable, value, np.nan) for name, value in self._measures(q, points).items()}
         return Reach(q, reachable, measures, condition)
 
-    def reach_box(self) -> tuple[FloatArray, FloatArray]:
-        """Box that holds every position with limbs no longer than `joint_limits` allow; see `ClosedForm.reach_box`."""
-        longest = max(high for _, high in self.joint_limits)
+    def reach_box(self, limits: tuple[tuple[float, float], ...]) -> tuple[FloatArray, FloatArray]:
+        """Box that holds every position with limbs no longer than *limits* allow; see `ClosedForm.reach_box`."""
+        longest = max(high for _, high in limits)
         p = self._parameters
         return np.array([0.0, 0.0, p.b - longest]), np.array([longest, longest, longest])
 
@@ -343,7 +343,8 @@ def _screw_candidate(name: str, description: str, moment_sign: float) -> Candida
     def torques(mech: Any, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray) -> FloatArray:
         x = mech.forward_kinematics(q)
         tau = screw_route.torques(mech.parameters, q, qd, qdd, x, external_force, moment_sign=moment_sign)
-        return tau + mech.friction(q, qd, qdd)
+        friction: FloatArray = mech.friction(q, qd, qdd)
+        return tau + friction
 
     return Candidate(name, "distributed", torques, description, "[GarciaMurillo2016] eq. (17)-(32)")
 
