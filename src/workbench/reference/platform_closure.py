@@ -246,8 +246,8 @@ class PlatformCloser(Continuation):
 
 def _least(matrices: FloatArray) -> FloatArray:
     """Least singular value ``(n,)`` of each matrix ``(n, a, b)``, a >= b."""
-    values: FloatArray = np.linalg.svd(matrices, compute_uv=False)[:, -1]
-    return values
+    values = np.linalg.svd(matrices, compute_uv=False)
+    return np.asarray(values[:, -1], dtype=np.float64)
 
 
 def _size(data: mujoco.MjData, site: int) -> float:
