@@ -48,7 +48,8 @@ def _twist(i, quaternion, aim, omega, values, rates, rise):  # type: ignore[no-u
     values[0] = angle + turn * math.floor((aim[0] - angle) / turn + 0.5)
     d = w * w + vi * vi
     if d < TURNED_OVER:
-        values[0] = math.nan
+        values[0] = rise[0] = math.nan
+        rates[0, i], rates[0, j], rates[0, k] = math.nan, math.nan, math.nan
         return
     ni, nj, nk = d, w * vk + vi * vj, vi * vk - w * vj
     rates[0, i], rates[0, j], rates[0, k] = 1.0, nj / d, nk / d
