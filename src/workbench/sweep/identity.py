@@ -18,7 +18,18 @@ from workbench.campaign.user_candidates import UserCandidate
 FORMAT = 1
 """Version of the files of a sweep and of its keys."""
 
-CODE = ("mjcf", "robots", "motion", "reference", "campaign", "sweep", "metrics.py", "arrays.py", "dry_friction.py")
+CODE = (
+    "mjcf",
+    "robots",
+    "motion",
+    "delimited",
+    "reference",
+    "campaign",
+    "sweep",
+    "metrics.py",
+    "arrays.py",
+    "dry_friction.py",
+)
 """The workbench's own code that makes numbers: two states of it may carry the same version number."""
 
 DESCRIBING = ("name", "title", "description")
