@@ -30,9 +30,10 @@ from workbench.motion import (
     JointMotion,
     PickAndPlace,
     PlatformMotion,
-    from_csv,
+    judged,
     multi_sine,
     pick_and_place,
+    read_joints,
     sine,
     time_grid,
 )
@@ -281,7 +282,7 @@ def _resolve(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float
     try:
         if isinstance(planned, PlatformMotion):
             q, qd, qdd = mechanism.joint_motion(planned.x, planned.xd, planned.xdd)
-            motion = JointMotion(planned.t, q, qd, qdd)
+            motion = JointMotion(planned.t, q, qd, qdd, planned.warnings)
         else:
             motion = planned
         x, xd, xdd = mechanism.platform_motion(motion.q, motion.qd, motion.qdd)
@@ -320,7 +321,8 @@ def plan_motion(spec: CaseSpec, file: Path, mechanism: Mechanism) -> JointMotion
     """
     motion = spec.motion
     if isinstance(motion, CsvMotion):
-        return from_csv(locate(file, motion.file, "motion.file"), mechanism.joints)
+        place = locate(file, motion.file, "motion.file")
+        return judged(read_joints(place, mechanism.joints, units=mechanism.coordinate_units))
     if isinstance(motion, CycleMotion):
         return pick_and_place(**motion.model_dump(exclude={"kind"}))
     joints = len(motion.terms) if isinstance(motion, MultiSineMotion) else len(motion.amplitude)

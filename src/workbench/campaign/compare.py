@@ -255,7 +255,10 @@ def _facts(case: Case, reference: MujocoReference, result: ReferenceResult, rows
         "conditions": [dataclasses.asdict(c) for c in case.mechanism.paper_conditions(case.motion.q)],
         "solutions_at_start": case.mechanism.assembly_solutions(case.motion.q[:1])[0].tolist(),
         "peak_reactions": {name: float(np.linalg.norm(f, axis=1).max()) for name, f in result.reactions.items()},
-        "warnings": case.mechanism.warnings(case.motion.t, case.motion.q, case.motion.qd),
+        "warnings": [
+            *case.motion.warnings,
+            *case.mechanism.warnings(case.motion.t, case.motion.q, case.motion.qd),
+        ],
     }
 
 
