@@ -16,7 +16,8 @@ from workbench.arrays import FloatArray
 from workbench.errors import MotionError, WorkbenchError
 from workbench.mjcf.compile import engine_warnings
 from workbench.mjcf.setup import Setup
-from workbench.reference.closure import CLOSED, LoopCloser, constraint_jacobian
+from workbench.reference.closure import LoopCloser, constraint_jacobian
+from workbench.reference.continuation import CLOSED
 from workbench.reference.engine import Engine
 from workbench.reference.mujoco_reference import Mobility
 from workbench.reference.structure import Structure, read_structure
