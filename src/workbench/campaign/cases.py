@@ -285,7 +285,7 @@ def _resolve(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float
             motion = JointMotion(planned.t, q, qd, qdd, planned.warnings)
         else:
             motion = planned
-        x, xd, xdd = mechanism.platform_motion(motion.q, motion.qd, motion.qdd)
+        x, xd, xdd = mechanism.platform_along(motion.t, motion.q, motion.qd, motion.qdd)
         mechanism.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
     except MotionError as error:
         raise with_unit_hint(at_time(error, planned.t), mechanism) from error

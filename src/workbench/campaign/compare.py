@@ -98,7 +98,9 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     series = _motion_columns(case)
     try:
         for mass_model in dict.fromkeys(c.reference for c in campaign.candidate) or ("distributed",):
-            results[mass_model] = reference.inverse_dynamics(motion.q, motion.qd, motion.qdd, mass_model, case.force)
+            results[mass_model] = reference.inverse_dynamics(
+                motion.q, motion.qd, motion.qdd, mass_model, case.force, along=motion.t
+            )
         computed = torques_of(case, dict.fromkeys(c.name for c in campaign.candidate))
         torques = computed.torques
     except MotionError as error:
@@ -155,7 +157,7 @@ def _raw_rows(
     motion = case.motion
     name = "distributed" if "distributed" in results else next(iter(results))
     spec = CandidateSpec(name=RAW_NAME, reference=name)
-    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force)
+    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force, motion.t)
     rows = _rows(case, spec, tau, results[name], evidence)
     return [dataclasses.replace(row, candidate=RAW_INVERSE, kind=CONTRAST) for row in rows]
 

@@ -69,6 +69,14 @@ class GenericMechanism(Mechanism):
         found = self._solved(q, qd, qdd)
         return found.x, found.xd, found.xdd
 
+    def platform_along(
+        self, t: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Position, velocity and acceleration of the platform site along a motion, each ``(n, 3)``."""
+        self._refuse_degrees(q)
+        found = self.reference.inverse_dynamics(q, qd, qdd, along=t)
+        return found.x, found.xd, found.xdd
+
     def jacobian(self, q: ArrayLike) -> FloatArray:
         """J ``(n, 3, na)`` with xd = J qd, column by column from the reference's velocities."""
         q = as_batch("q", q, len(self.joints))

@@ -79,6 +79,7 @@ def power_balance(
     mass_model: str = "distributed",
     external_force: ArrayLike | None = None,
     tau: ArrayLike | None = None,
+    along: ArrayLike | None = None,
 ) -> PowerBalance:
     """Hold torques against the rate of MuJoCo's energy.
 
@@ -94,6 +95,8 @@ def power_balance(
         Newtons, paper frame, acting on the platform: ``(3,)`` or ``(n, 3)``.
     tau
         Torques to judge, ``(n, na)``; None judges the reference's own.
+    along
+        Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
 
     Raises
     ------
@@ -107,12 +110,12 @@ def power_balance(
     if not len(q):
         raise ArrayError("q: expected at least one sample, got none")
     force = as_force("external_force", external_force, len(q))
-    result = reference.inverse_dynamics(q, qd, qdd, mass_model, force)
+    result = reference.inverse_dynamics(q, qd, qdd, mass_model, force, along=along)
     torques = result.tau if tau is None else _same_shape(tau, q)
     power = np.sum(torques * qd, axis=1)
     peak = float(np.abs(power).max())
     kept = _selection(power)
-    storage, doubt = _energy_rate(reference, q[kept], qd[kept], qdd[kept], mass_model)
+    storage, doubt = _energy_rate(reference, result.qpos[kept], q[kept], qd[kept], qdd[kept], mass_model)
     model = reference.compiled(mass_model)
     qvel = result.qvel[kept]
     dissipation = qvel**2 @ np.asarray(model.dof_damping) + np.abs(qvel) @ np.asarray(model.dof_frictionloss)
@@ -165,7 +168,7 @@ def time_scale(qd: FloatArray, qdd: FloatArray) -> float:
 
 
 def _energy_rate(
-    reference: MujocoReference, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str
+    reference: MujocoReference, qpos: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str
 ) -> tuple[FloatArray, FloatArray]:
     """Return dE/dt ``(m,)`` and how far it is in doubt, both in watts."""
     scale = time_scale(qd, qdd)
@@ -174,7 +177,7 @@ def _energy_rate(
     step = FIRST_STEP * scale
     for attempt in range(SHRINKINGS + 1):
         try:
-            rate = _difference(reference, q, qd, qdd, mass_model, step)
+            rate = _difference(reference, qpos, q, qd, qdd, mass_model, step)
             break
         except MotionError:
             # a displaced sample beyond the edge of the workspace; the samples themselves were closed before
@@ -186,7 +189,7 @@ def _energy_rate(
     active = np.arange(len(q))
     for _ in range(HALVINGS):
         step *= 0.5
-        finer = _difference(reference, q[active], qd[active], qdd[active], mass_model, step)
+        finer = _difference(reference, qpos[active], q[active], qd[active], qdd[active], mass_model, step)
         # Richardson: the error of the twelfth-order difference falls by 2^12 with each halving
         refined = finer + (finer - rate[active]) / 4095.0
         gap = np.abs(refined - estimate[active])
@@ -201,19 +204,26 @@ def _energy_rate(
 
 
 def _difference(
-    reference: MujocoReference, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, step: float
+    reference: MujocoReference,
+    qpos: FloatArray,
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+    mass_model: str,
+    step: float,
 ) -> FloatArray:
     """Twelfth-order central difference of the energy along q + qd t + qdd t^2/2."""
     n = len(q)
     times = step * np.array([sign * k for k in range(1, len(WEIGHTS) + 1) for sign in (1, -1)])[:, None, None]
-    # sample after sample, so that the closure starts each from a neighbour
     moved = (q + qd * times + 0.5 * qdd * times**2).swapaxes(0, 1).reshape(-1, q.shape[1])
     speed = (qd + qdd * times).swapaxes(0, 1).reshape(-1, q.shape[1])
     still = np.zeros_like(moved)
     # along the curve excess actuators would leave the mechanism's motions; the leading ones determine its state
     solver, lead = reference.determining
     moved, speed, still = moved[:, lead], speed[:, lead], still[:, lead]
-    energy = solver.inverse_dynamics(moved, speed, still, mass_model).energy.sum(axis=1).reshape(n, len(WEIGHTS), 2)
+    # each from its own sample's configuration: from home another assembly may be on the way
+    found = solver.inverse_dynamics(moved, speed, still, mass_model, near=np.repeat(qpos, len(times), axis=0))
+    energy = found.energy.sum(axis=1).reshape(n, len(WEIGHTS), 2)
     rate: FloatArray = (energy[:, :, 0] - energy[:, :, 1]) @ np.array(WEIGHTS) / step
     return rate
 

@@ -160,6 +160,15 @@ class Mechanism(ABC):
     def platform_motion(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Position, velocity and acceleration of the platform, each ``(n, 3)``."""
 
+    def platform_along(
+        self, t: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """As `platform_motion`, for samples that are one motion, in the order of times ``(n,)``.
+
+        Closed forms know their branch from q alone; what closes loops step by step follows the motion.
+        """
+        return self.platform_motion(q, qd, qdd)
+
     @abstractmethod
     def joint_motion(self, x: ArrayLike, xd: ArrayLike, xdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Actuated position, velocity and acceleration, each ``(n, 3)``, from a platform motion."""
