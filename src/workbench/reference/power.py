@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch, as_batches, as_force
 from workbench.errors import ArrayError, MotionError
-from workbench.reference.mujoco_reference import MujocoReference
+from workbench.reference.mujoco_reference import MujocoReference, ReferenceResult
 
 MOST_SAMPLES = 150
 """Samples looked at; a longer motion is thinned out evenly, and the samples of greatest power are always kept."""
@@ -40,6 +40,9 @@ without acceleration has a time scale too."""
 SHRINKINGS = 6
 """How often the first step is halved where a displaced sample leaves the workspace."""
 
+ROUNDING = 1e-13
+"""Of the energy: what its rounding may pretend between two samples."""
+
 WEIGHTS = (6 / 7, -15 / 56, 5 / 63, -1 / 56, 1 / 385, -1 / 5544)
 """Twelfth-order central difference: the weights of f(+k h) - f(-k h), k = 1 to 6."""
 
@@ -63,8 +66,8 @@ class PowerBalance:
     peak_power: float
     """max |tau . qd| over all n samples, the normaliser, W"""
     relative: float
-    """max |residual| / peak_power; NaN where the torques hold NaN and where nothing moves: a balance of nothing judges
-    nothing, and NaN satisfies no bound"""
+    """max |residual| / peak_power, or more where energy jumps between samples of a motion; NaN where the torques hold
+    NaN and where nothing moves: a balance of nothing judges nothing, and NaN satisfies no bound"""
     worst_sample: int
     """index into the n samples of the largest |residual|"""
     differentiation: float
@@ -115,6 +118,7 @@ def power_balance(
     power = np.sum(torques * qd, axis=1)
     peak = float(np.abs(power).max())
     kept = _selection(power)
+    jump = 0.0 if along is None else _energy_jump(reference, result, power, force, mass_model, np.asarray(along))
     storage, doubt = _energy_rate(reference, result.qpos[kept], q[kept], qd[kept], qdd[kept], mass_model)
     model = reference.compiled(mass_model)
     qvel = result.qvel[kept]
@@ -130,10 +134,40 @@ def power_balance(
         storage=storage,
         dissipation=dissipation,
         peak_power=peak,
-        relative=_ratio(float(size.max()), peak),
+        relative=_ratio(max(float(size.max()), jump), peak),
         worst_sample=int(kept[int(np.argmax(np.where(np.isnan(size), np.inf, size)))]),
         differentiation=_ratio(float(doubt.max()), peak),
     )
+
+
+def _energy_jump(
+    reference: MujocoReference,
+    result: ReferenceResult,
+    power: FloatArray,
+    force: FloatArray,
+    mass_model: str,
+    t: FloatArray,
+) -> float:
+    """Largest change of energy between neighbours that no power between them accounts for, in watts over the step.
+
+    Whatever rule integrates the power over a step, its error is below the step times how much the power changes around
+    it; a motion that goes on has nothing beyond that, one that jumps to another assembly has its gap in height.
+    """
+    if len(t) < 2:
+        return 0.0
+    model = reference.compiled(mass_model)
+    lost = result.qvel**2 @ np.asarray(model.dof_damping) + np.abs(result.qvel) @ np.asarray(model.dof_frictionloss)
+    put_in = power + np.sum(force * result.xd, axis=1) - lost
+    change = np.diff(result.energy.sum(axis=1)) / np.diff(t)
+    around = np.stack([np.roll(put_in, shift) for shift in (1, 0, -1, -2)])
+    around[0, 0], around[2:, -1], around[3, -2:] = put_in[0], put_in[-1], put_in[-1]
+    low, high = around.min(axis=0)[:-1], around.max(axis=0)[:-1]
+    # as much again to both sides: between the samples the power may peak
+    room = high - low
+    unexplained = np.maximum(change - (high + room), (low - room) - change)
+    if np.isnan(unexplained).any():
+        return float("nan")
+    return max(0.0, float(unexplained.max()) - ROUNDING * float(np.abs(result.energy).max() / np.diff(t).min()))
 
 
 def _same_shape(tau: ArrayLike, q: FloatArray) -> FloatArray:
