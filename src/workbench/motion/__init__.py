@@ -4,15 +4,25 @@ A `JointMotion` is planned in actuated coordinates, a `PlatformMotion` in platfo
 turns the second into the first. Nothing here knows a mechanism: workspace limits are checked where they are known.
 """
 
-from workbench.motion.base import MAX_SAMPLES, Consistency, JointMotion, PlatformMotion, time_grid
+from workbench.motion.base import (
+    COORDINATES,
+    MAX_SAMPLES,
+    POSITION,
+    Consistency,
+    JointMotion,
+    PlatformMotion,
+    time_grid,
+)
 from workbench.motion.cycle import LAWS, PickAndPlace, pick_and_place, time_law
-from workbench.motion.harmonic import Harmonic, multi_sine, sine
+from workbench.motion.harmonic import Harmonic, multi_sine, platform_multi_sine, platform_sine, sine
 from workbench.motion.judge import judged
 from workbench.motion.table import Tabulated, from_csv, platform_from_csv, read_joints, read_platform
 
 __all__ = [
+    "COORDINATES",
     "LAWS",
     "MAX_SAMPLES",
+    "POSITION",
     "Consistency",
     "Harmonic",
     "JointMotion",
@@ -24,6 +34,8 @@ __all__ = [
     "multi_sine",
     "pick_and_place",
     "platform_from_csv",
+    "platform_multi_sine",
+    "platform_sine",
     "read_joints",
     "read_platform",
     "sine",
