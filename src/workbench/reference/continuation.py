@@ -37,8 +37,14 @@ NEGLIGIBLE = 1e-7
 SMALLEST_STEP = 1e-6
 """Fraction of the way from the start to a sample; a smaller step means that the way is blocked."""
 
-SMALLEST_MARKED_STEP = 1e-3
+SMALLEST_MARKED_STEP = 2.0**-8
 """The same where samples are only marked as out of reach: the way from a neighbour is short."""
+
+SMALLEST_FAR_STEP = 2.0**-4
+"""And where no neighbour is in reach, so that the way from the nearest sample that is most often leads out of reach."""
+
+NEIGHBOURS = 1.8
+"""Samples that are to be marked are neighbours up to this many times their usual distance: in a grid, diagonals too."""
 
 CLOSER = 0.99
 """A marked sample is tried again from a neighbour that is nearer than this part of the last one's distance."""
@@ -115,52 +121,53 @@ class Continuation(ABC):
         MotionError
             Naming the first sample that cannot be reached on the home branch, and where the way to it ends.
         """
-        return self._follow(target, marking=False)[0]
+        n = len(target)
+        found = self._nothing(n, target.shape[1])
+        known = np.zeros(0, dtype=np.int64)
+        scale = _scale(target)
+        for spacing in SEED_SPACINGS:
+            wanted = np.setdiff1d(np.arange(0, n, spacing), known)
+            if not len(wanted):
+                continue
+            if len(known):
+                nearest = known[_nearest(target[wanted] / scale, target[known] / scale)[0]]
+                self._reach(target, wanted, found, target[nearest], nearest, found)
+            else:
+                home, row = np.tile(self.start, (len(wanted), 1)), np.zeros(len(wanted), dtype=np.int64)
+                self._reach(target, wanted, self._home, home, row, found)
+            known = np.union1d(known, wanted)
+        return found
 
     def mark(self, target: FloatArray) -> tuple[Assembly, np.ndarray]:
         """As `follow`, for samples that may be out of reach: ``(n,)`` says which were reached.
 
-        A sample counts as reached when a straight line from the home pose or from another sample leads to it.
+        The samples are reached like a rising tide: from home those nearby, from those their neighbours. When it stands
+        still, what is farther off is tried, too, and what has a nearer neighbour in reach than when it was last tried.
         """
-        found, arrived, origins = self._follow(target, marking=True)
-        if len(target) == 0 or not arrived.any():
-            return found, arrived
-        scale = _scale(target)
-        scaled = target / scale
-        tried = np.linalg.norm(scaled - np.where(origins[:, None] < 0, self.start / scale, scaled[origins]), axis=1)
-        while True:
-            lost, known = np.flatnonzero(~arrived), np.flatnonzero(arrived)
-            if not len(lost):
-                return found, arrived
-            seeds, distances = _nearest(scaled[lost], scaled[known])
-            again = distances < CLOSER * tried[lost]
-            if not again.any():
-                return found, arrived
-            wanted, origin = lost[again], known[seeds[again]]
-            tried[wanted] = distances[again]
-            arrived[wanted] = self._reach(target, wanted, found, target[origin], origin, found, marking=True)
-
-    def _follow(self, target: FloatArray, marking: bool) -> tuple[Assembly, np.ndarray, np.ndarray]:
-        """Assembly, which samples were reached, and from which other one the way to each was tried (-1: home)."""
         n = len(target)
-        found = self._nothing(n, target.shape[1])
-        arrived, origins = np.zeros(n, dtype=np.bool_), np.full(n, -1)
-        tried = np.zeros(0, dtype=np.int64)
-        scale = _scale(target)
-        for spacing in SEED_SPACINGS:
-            wanted = np.setdiff1d(np.arange(0, n, spacing), tried)
-            if not len(wanted):
-                continue
-            known = np.flatnonzero(arrived)
-            if len(known):
-                nearest = known[_nearest(target[wanted] / scale, target[known] / scale)[0]]
-                origins[wanted] = nearest
-                arrived[wanted] = self._reach(target, wanted, found, target[nearest], nearest, found, marking)
-            else:
-                home, row = np.tile(self.start, (len(wanted), 1)), np.zeros(len(wanted), dtype=np.int64)
-                arrived[wanted] = self._reach(target, wanted, self._home, home, row, found, marking)
-            tried = np.union1d(tried, wanted)
-        return found, arrived, origins
+        # home is the last row
+        points = np.concatenate([target, self.start[None, :]])
+        found = self._nothing(n + 1, target.shape[1])
+        found.put(np.array([n]), self._home)
+        arrived = np.arange(n + 1) == n
+        scaled = points / _scale(target)
+        tried = np.full(n + 1, np.inf)
+        radius = near = max(NEIGHBOURS * _spacing(scaled[:n]), _from_home(scaled))
+        while not arrived.all():
+            lost, known = np.flatnonzero(~arrived), np.flatnonzero(arrived)
+            seeds, distances = _nearest(scaled[lost], scaled[known])
+            nearer = distances < CLOSER * tried[lost]
+            if not nearer.any():
+                break
+            radius = max(radius, float(distances[nearer].min()))
+            chosen = nearer & (distances <= radius)
+            wanted, origin = lost[chosen], known[seeds[chosen]]
+            tried[wanted] = distances[chosen]
+            smallest = SMALLEST_MARKED_STEP if radius <= near else SMALLEST_FAR_STEP
+            arrived[wanted] = self._reach(points, wanted, found, points[origin], origin, found, smallest)
+            if not arrived[wanted].any():
+                radius *= 2.0
+        return found.at(slice(0, n)), arrived[:n]
 
     def _reach(
         self,
@@ -170,7 +177,7 @@ class Continuation(ABC):
         origins: FloatArray,
         rows: np.ndarray,
         found: Assembly,
-        marking: bool,
+        marked_below: float = 0.0,
     ) -> np.ndarray:
         """Continuation from *rows* of known configurations, at coordinates *origins*, to rows *wanted* of *target*."""
         arrived = np.zeros(len(wanted), dtype=np.bool_)
@@ -178,7 +185,7 @@ class Continuation(ABC):
         def block(evaluator: Evaluator, part: slice) -> None:
             names = wanted[part]
             here, arrived[part] = self._continue(
-                evaluator, known.at(rows[part]), origins[part], target[names], names, marking
+                evaluator, known.at(rows[part]), origins[part], target[names], names, marked_below
             )
             found.put(names[arrived[part]], here, arrived[part])
 
@@ -192,10 +199,13 @@ class Continuation(ABC):
         origin: FloatArray,
         target: FloatArray,
         names: np.ndarray,
-        marking: bool,
+        marked_below: float,
     ) -> tuple[Assembly, np.ndarray]:
-        """Follow straight lines from closed configurations at *origin* to *target* ``(k, m)``; which ones arrived."""
-        smallest = SMALLEST_MARKED_STEP if marking else SMALLEST_STEP
+        """Follow straight lines from closed configurations at *origin* to *target* ``(k, m)``; which ones arrived.
+
+        A blocked way is an error, or, where *marked_below* is a smallest step, ends without one.
+        """
+        smallest = marked_below or SMALLEST_STEP
         way = target - origin
         done, step = np.zeros(len(target)), np.ones(len(target))
         active = np.arange(len(target))
@@ -218,7 +228,7 @@ class Continuation(ABC):
             refused = active[~accepted]
             step[refused] = 0.5 * part[~accepted]
             blocked = np.where(accepted, longest, step[active]) < smallest
-            if blocked.any() and not marking:
+            if blocked.any() and not marked_below:
                 row = active[blocked][0]
                 self._refuse(
                     int(names[row]), target[row], origin[row] + way[row] * done[row], here.at(slice(row, row + 1))
@@ -263,6 +273,18 @@ def _scale(points: FloatArray) -> FloatArray:
     """``(m,)`` the extent of each coordinate, so that distances in it mean something."""
     scale: FloatArray = np.maximum(np.ptp(points, axis=0), 1e-9) if len(points) else np.ones(points.shape[1])
     return scale
+
+
+def _spacing(points: FloatArray) -> float:
+    """Usual distance between neighbours, the median over all points ``(n, m)``."""
+    from scipy.spatial import cKDTree
+
+    return float(np.median(cKDTree(points).query(points, k=2)[0][:, 1])) if len(points) > 1 else np.inf
+
+
+def _from_home(points: FloatArray) -> float:
+    """Distance of the last point from the nearest other one."""
+    return float(_nearest(points[-1:], points[:-1])[1][0]) if len(points) > 1 else np.inf
 
 
 def _nearest(points: FloatArray, seeds: FloatArray) -> tuple[np.ndarray, FloatArray]:

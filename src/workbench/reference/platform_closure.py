@@ -17,7 +17,7 @@ from workbench.reference.closure import LoopCloser
 from workbench.reference.continuation import ASTRAY, CLOSED, NEWTON_STEPS, Assembly, Continuation
 from workbench.reference.engine import Evaluator
 from workbench.reference.platform_kernels import platform_accelerations, platform_jacobian, platform_newton
-from workbench.reference.task import COORDINATES, Task, task_of
+from workbench.reference.task import COORDINATES, POSITIONS, Task, task_of
 
 DEPENDENT = 1e-9
 """A singular value of the task coordinates over the robot's motions below this (lengths in robot sizes) is zero."""
@@ -64,8 +64,7 @@ class PlatformCloser(Continuation):
         self._table = task.table(*self._site)
         self.size = _size(data, structure.platform_site)
         """m: the robot's length, by which turns and distances are compared"""
-        hinged = np.array([model.jnt_type[j] != mujoco.mjtJoint.mjJNT_SLIDE for j in model.dof_jntid])
-        self._lengths = np.where(hinged, self.size, 1.0)
+        self._lengths = np.where(_turning(model), self.size, 1.0)
         if len(task.names) != len(leading):
             has = " ".join(self._has(loops))
             raise ParameterError(
@@ -78,12 +77,6 @@ class PlatformCloser(Continuation):
         self._refuse_dependent(loops, rows)
         self._sign = np.ones(1)
         self._home = self._newton_alone(self.home[None, :].copy(), self.start[None, :])
-        if not self._home.residual[0] <= CLOSED:
-            raise ModelError(
-                f"{structure.file}: {' '.join(task.names)} cannot say where the platform is in the home pose; where one"
-                " rotation is given, no more than half a turn may stand between the axes of base and platform site",
-                file=structure.file,
-            )
         self._sign = self._signs(self._home)
 
     def accelerations(
@@ -194,29 +187,35 @@ class PlatformCloser(Continuation):
 
     def _has(self, loops: LoopCloser) -> list[str]:
         """Task coordinates that change when the robot moves from home."""
-        speeds = np.linalg.norm(self._motions(loops, self.home[None, :], task_of(COORDINATES))[0], axis=1)
-        return [name for name, speed in zip(COORDINATES, speeds, strict=True) if speed > DEPENDENT]
+        body, home = self._site[0], self.home[None, :]
+        slides = self._rows(home, np.zeros((1, 3)), task_of(POSITIONS).table(*self._site))[0][0]
+        # angular velocity itself, which has no convention and no singular orientation
+        turns = self.engine.poses(home).cdof[0][:, :3] * self.structure.moves[body][:, None] @ self._base[0]
+        speeds = np.linalg.norm(self._motions(loops, self.home, np.concatenate([slides, turns.T * self.size])), axis=1)
+        return [name for name, speed in zip(COORDINATES, speeds, strict=True) if speed > DEPENDENT * self.size]
 
-    def _motions(self, loops: LoopCloser, qpos: FloatArray, task: Task) -> FloatArray:
-        """Task velocities, turns times `size`, of an orthonormal basis of the mechanism's motions: ``(n, m, k)``."""
-        table = task.table(*self._site)
-        rows = self._rows(qpos, np.zeros((len(qpos), len(task.names))), table)[0]
-        rows[:, task.turn_columns] *= self.size
-        found = []
-        for configuration, row in zip(qpos, rows, strict=True):
-            closures = loops.jacobian(configuration) / self._lengths
-            rank = np.linalg.matrix_rank(closures, tol=1e-9) if len(closures) else 0
-            basis = np.linalg.svd(closures)[2][rank:] if len(closures) else np.eye(len(self._lengths))
-            found.append((row / self._lengths) @ basis.T)
-        return np.array(found)
+    def _motions(self, loops: LoopCloser, qpos: FloatArray, rows: FloatArray) -> FloatArray:
+        """Velocities *rows* ``(m, nv)`` of an orthonormal basis of the mechanism's motions at *qpos*: ``(m, k)``."""
+        closures = loops.jacobian(qpos) / self._lengths
+        rank = np.linalg.matrix_rank(closures, tol=1e-9) if len(closures) else 0
+        basis = np.linalg.svd(closures)[2][rank:] if len(closures) else np.eye(len(self._lengths))
+        found: FloatArray = (rows / self._lengths) @ basis.T
+        return found
 
     def _refuse_dependent(self, loops: LoopCloser, rows: FloatArray) -> None:
         """Refuse coordinates that do not determine the home pose, and say whether the robot or the pose is to blame."""
-        names, wanted = self.task.names, len(self.leading)
+        names, wanted, file = self.task.names, len(self.leading), self.structure.file
+        if not np.isfinite(rows).all():
+            raise ModelError(
+                f"{file}: in the home pose the platform site's axes are turned over against the base's, by half a turn"
+                f" about an axis across {names[int(self.task.turn_columns[0])]}, so that its angle has no value; turn"
+                " the site (euler)",
+                file=file,
+            )
         rank = self._rank(loops, self.home)
-        if np.isfinite(rows).all() and rank == wanted:
+        if rank == wanted:
             return
-        file, has = self.structure.file, self._has(loops)
+        has = self._has(loops)
         lacking = [name for name in names if name not in has]
         for way in np.concatenate([np.eye(wanted), -np.eye(wanted), np.ones((1, wanted))]) * NEARBY:
             target = self.home[self.structure.actuated_qpos].copy()
@@ -240,14 +239,25 @@ class PlatformCloser(Continuation):
         )
 
     def _rank(self, loops: LoopCloser, qpos: FloatArray) -> int:
-        values = np.linalg.svd(self._motions(loops, qpos[None, :], self.task)[0], compute_uv=False)
+        rows = self._rows(qpos[None, :], np.zeros((1, len(self.task.names))))[0][0]
+        rows[self.task.turn_columns] *= self.size
+        values = np.linalg.svd(self._motions(loops, qpos, rows), compute_uv=False)
         return int(np.count_nonzero(values > DEPENDENT * self.size))
+
+
+def _turning(model: mujoco.MjModel) -> np.ndarray:
+    """Which velocities ``(nv,)`` are angular; of a free joint the last three."""
+    kinds = np.asarray(model.jnt_type)[model.dof_jntid]
+    place = np.arange(model.nv) - np.asarray(model.jnt_dofadr)[model.dof_jntid]
+    free = kinds == mujoco.mjtJoint.mjJNT_FREE.value
+    turning: np.ndarray = (kinds != mujoco.mjtJoint.mjJNT_SLIDE.value) & ~(free & (place < 3))
+    return turning
 
 
 def _least(matrices: FloatArray) -> FloatArray:
     """Least singular value ``(n,)`` of each matrix ``(n, a, b)``, a >= b."""
-    values: FloatArray = np.linalg.svd(matrices, compute_uv=False)[:, -1]
-    return values
+    values = np.linalg.svd(matrices, compute_uv=False)
+    return np.asarray(values[:, -1], dtype=np.float64)
 
 
 def _size(data: mujoco.MjData, site: int) -> float:

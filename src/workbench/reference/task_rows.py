@@ -15,6 +15,9 @@ from workbench.reference.rows import point_motion, point_rows
 SERIES = 0.5
 """rad: below this angle the coefficients of the rotation vector's rates are summed as series, which lose no digit."""
 
+TURNED_OVER = 1e-8
+"""Squared cosine of half the lean; below it the lean is half a turn, and the angle about an axis has no value (NaN)."""
+
 
 @compiled
 def turn_coordinates(axes, quaternion, aim, omega, values, rates, rise):  # type: ignore[no-untyped-def]
@@ -44,6 +47,10 @@ def _twist(i, quaternion, aim, omega, values, rates, rise):  # type: ignore[no-u
     angle = 2.0 * math.atan2(vi, w)
     values[0] = angle + turn * math.floor((aim[0] - angle) / turn + 0.5)
     d = w * w + vi * vi
+    if d < TURNED_OVER:
+        values[0] = rise[0] = math.nan
+        rates[0, i], rates[0, j], rates[0, k] = math.nan, math.nan, math.nan
+        return
     ni, nj, nk = d, w * vk + vi * vj, vi * vk - w * vj
     rates[0, i], rates[0, j], rates[0, k] = 1.0, nj / d, nk / d
     wd = -0.5 * (oi * vi + oj * vj + ok * vk)
