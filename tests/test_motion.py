@@ -440,14 +440,14 @@ def test_pick_and_place_samples_the_whole_cycle() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"pick": (0, 0)}, "pick and place: pick has 2 entries; allowed: 3"),
-        ({"place": (0, math.nan, 0)}, "pick and place: place, entry 2 = nan m; allowed: a finite number"),
+        ({"pick": (0, 0)}, "pick and place: pick has 2 entries; allowed: 3, the task coordinates x, y, z"),
+        ({"place": (0, math.nan, 0)}, "pick and place: place, entry 2 = nan; allowed: a finite number"),
         ({"lift": 0.0}, "pick and place: lift = 0 m; allowed: > 0"),
         ({"lift": "high"}, "pick and place: lift = 'high'; allowed: a number"),
         ({"up": None}, "pick and place: lift = 0.06 m without up; allowed: a height with up, or a vector"),
-        ({"up": (0, 0, 0)}, "pick and place: up = (0, 0, 0); allowed: a direction, of any length but zero"),
+        ({"up": (0, 0, 0)}, "pick and place: up is all zeros; allowed: a direction, of any length but zero"),
         ({"lift": (0, 0, 1)}, "pick and place: lift is a vector and up is given too; allowed: a height with up"),
-        ({"lift": (0, 0, 0), "up": None}, "pick and place: lift = (0, 0, 0) m; allowed: a vector that is not zero"),
+        ({"lift": (0, 0, 0), "up": None}, "pick and place: lift is all zeros; allowed: a vector that is not zero"),
         ({"lift_time": 0.0}, "pick and place: lift_time = 0 s; allowed: > 0"),
         ({"traverse_time": -1.0}, "pick and place: traverse_time = -1 s; allowed: > 0"),
         ({"lower_time": math.inf}, "pick and place: lower_time = inf s; allowed: > 0"),

@@ -12,31 +12,15 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.campaign.generic import generic_mechanism
-from workbench.campaign.spec import (
-    MAX_SAMPLES,
-    Campaign,
-    CaseSpec,
-    CsvMotion,
-    CycleMotion,
-    MultiSineMotion,
-    SineMotion,
-)
+from workbench.campaign.motion_spec import MAX_SAMPLES
+from workbench.campaign.planned import formula_of, planned_motion
+from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.user_candidates import UserCandidate, offer
 from workbench.data_files import bundled, bundled_names
 from workbench.documents import shorten
 from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
 from workbench.mjcf.setup import Setup
-from workbench.motion import (
-    JointMotion,
-    PickAndPlace,
-    PlatformMotion,
-    judged,
-    multi_sine,
-    pick_and_place,
-    read_joints,
-    sine,
-    time_grid,
-)
+from workbench.motion import JointMotion, PlatformMotion
 from workbench.reference.replay import motion_through
 from workbench.robots.assignments import resolve_changes
 from workbench.robots.base import Mechanism
@@ -319,25 +303,14 @@ def plan_motion(spec: CaseSpec, file: Path, mechanism: Mechanism) -> JointMotion
     ParameterError
         Another number of joints than the mechanism has.
     """
-    motion = spec.motion
-    if isinstance(motion, CsvMotion):
-        place = locate(file, motion.file, "motion.file")
-        return judged(read_joints(place, mechanism.joints, units=mechanism.coordinate_units))
-    if isinstance(motion, CycleMotion):
-        return pick_and_place(**motion.model_dump(exclude={"kind"}))
-    joints = len(motion.terms) if isinstance(motion, MultiSineMotion) else len(motion.amplitude)
-    if len(motion.offset) != len(mechanism.joints) or joints != len(mechanism.joints):
-        raise ParameterError(
-            f"motion: {len(motion.offset)} offset(s) and {joints} joint(s); {mechanism.name} has"
-            f" {len(mechanism.joints)} actuated joints: {', '.join(mechanism.joints)}"
-        )
-    return _harmonic(motion, time_grid(motion.start, motion.stop, samples=motion.samples, rate=motion.rate))
-
-
-def _harmonic(motion: SineMotion | MultiSineMotion, t: FloatArray) -> JointMotion:
-    if isinstance(motion, SineMotion):
-        return sine(t, motion.offset, motion.amplitude, motion.frequency, motion.phase)
-    return multi_sine(t, motion.offset, motion.terms)
+    return planned_motion(
+        spec.motion,
+        lambda name: locate(file, name, "motion.file"),
+        mechanism.name,
+        mechanism.joints,
+        mechanism.coordinate_units,
+        mechanism.coordinates,
+    )
 
 
 Course = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
@@ -349,20 +322,14 @@ def course_of(case: Case) -> Course:
 
     The function raises MotionError for times or poses that the motion does not have.
     """
-    motion = case.spec.motion
-    if isinstance(motion, SineMotion | MultiSineMotion):
+    formula = formula_of(case.spec.motion, case.mechanism.coordinates)
+    if formula is not None:
 
-        def harmonic(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            found = _harmonic(motion, t)
+        def course(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            found = formula(t)
+            if isinstance(found, PlatformMotion):
+                return case.mechanism.joint_motion(found.x, found.xd, found.xdd)
             return found.q, found.qd, found.qdd
 
-        return harmonic
-    if isinstance(motion, CycleMotion):
-        plan = PickAndPlace(**motion.model_dump(exclude={"kind", "samples", "rate"}))
-
-        def cycle(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            found = plan.sample(np.clip(t, 0.0, plan.duration))
-            return case.mechanism.joint_motion(found.x, found.xd, found.xdd)
-
-        return cycle
+        return course
     return motion_through(case.motion.t, case.motion.q, case.motion.qd, case.motion.qdd)

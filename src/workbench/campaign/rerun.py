@@ -13,8 +13,9 @@ from workbench.campaign import provenance
 from workbench.campaign.cases import locate, resolve_cases
 from workbench.campaign.compare import Row
 from workbench.campaign.evidence import Effort
+from workbench.campaign.motion_spec import TableMotion
 from workbench.campaign.run import compute_named_case
-from workbench.campaign.spec import CsvMotion, load_campaign
+from workbench.campaign.spec import load_campaign
 from workbench.campaign.user_candidates import load_candidates, with_rows
 from workbench.errors import WorkbenchError
 from workbench.mjcf.compile import find_model
@@ -80,7 +81,7 @@ def files_of(path: str | Path, model: Path | None = None, candidates: Sequence[s
         campaign, file = load_campaign(path)
         found[0] = file
         names = [] if model is not None else [(campaign.model, "model")]
-        names += [(case.motion.file, "motion.file") for case in campaign.case if isinstance(case.motion, CsvMotion)]
+        names += [(case.motion.file, "motion.file") for case in campaign.case if isinstance(case.motion, TableMotion)]
         for name, what in names:
             with contextlib.suppress(WorkbenchError):
                 found.append(locate(file, name, what))

@@ -14,7 +14,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError
-from workbench.reference.continuation import CORRECTION, LONGEST_STEP, NEGLIGIBLE, Assembly, Continuation
+from workbench.reference.continuation import CORRECTION, LONGEST_STEP, NEGLIGIBLE, SMALLEST_STEP, Assembly, Continuation
 from workbench.reference.engine import Evaluator
 from workbench.reference.structure import Structure
 from workbench.reference.tables import BALL
@@ -57,7 +57,7 @@ class OrderedClosure(Continuation):
             # from here on follow the motion until it meets what stands already
             while here + 1 < len(q):
                 one = np.array([here + 1])
-                self._reach(q, one, found, q[here][None, :], np.array([here]), step, marking=False)
+                self._reach(q, one, found, q[here][None, :], np.array([here]), step)
                 met = np.isfinite(found.residual[one]) & (self._apart(step.qpos[one], found.qpos[one]) <= SAME)
                 if met[0]:
                     break
@@ -81,7 +81,7 @@ class OrderedClosure(Continuation):
             start.put(names, self._newton(evaluator, qpos[rows].copy(), own[rows]))
 
         self.engine.in_blocks(block, n)
-        self._reach(q, np.arange(n), start, own, np.arange(n), found, marking=False)
+        self._reach(q, np.arange(n), start, own, np.arange(n), found)
         return found
 
     def _linked(self, found: Assembly, q: FloatArray) -> np.ndarray:
@@ -95,7 +95,7 @@ class OrderedClosure(Continuation):
         again = np.flatnonzero(~linked)
         if len(again):  # a longer way takes several steps; again all at once, and only compared
             stepped = self._nothing(len(q), q.shape[1])
-            arrived = self._reach(q, again + 1, found, q[again], again, stepped, marking=True)
+            arrived = self._reach(q, again + 1, found, q[again], again, stepped, SMALLEST_STEP)
             linked[again] = arrived & (self._apart(stepped.qpos[again + 1], found.qpos[again + 1]) <= SAME)
         return linked
 

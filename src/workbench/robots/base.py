@@ -100,6 +100,8 @@ class Mechanism(ABC):
     """range of each actuated coordinate that a workspace is computed for, where the user gives none"""
     platform_axes: ClassVar[tuple[str, ...]]
     """names of the platform coordinates as the paper writes them"""
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    """task coordinates, in which motions of the platform are given"""
     mass_models: ClassVar[tuple[str, ...]] = ("distributed", "lumped")
     parameter_table: ClassVar[tuple[ParameterInfo, ...]]
     targets: ClassVar[tuple[Target, ...]]
