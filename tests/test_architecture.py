@@ -29,6 +29,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     (
         "motion",
         "delimited",
+        "hints",
         "metrics",
         "dry_friction",
         "staging",

@@ -18,6 +18,7 @@ from workbench.campaign.torques import Fault, torques_of
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdict_of
 from workbench.errors import ModelError, MotionError
+from workbench.hints import hint_of
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.raw_inverse import raw_mj_inverse
 from workbench.reference.skeleton import skeleton
@@ -114,6 +115,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for row in _rows(case, candidate, computed.judged(candidate.name), results[candidate.reference], evidence)
     ]
     rows = [dataclasses.replace(row, verdict=FAIL) if row.candidate in computed.faults else row for row in rows]
+    hints = _hints(case, rows, torques, results)
     if effort.budget:
         rows += _raw_rows(case, reference, results, evidence)
     for mass_model, result in results.items():
@@ -126,6 +128,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual
     facts = _facts(case, reference, first, rows) | {"evidence": evidence.facts()}
+    facts["warnings"] += hints
     if effort.drawing:
         drawing = skeleton(reference, first.qpos)
         for point, place in drawing.points.items():
@@ -134,6 +137,18 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     poses = first.qpos if effort.drawing else None
     faults = tuple(computed.faults.values())
     return CaseResult(case.name, rows, series, computed.noted(facts), faults, reference.text, poses)
+
+
+def _hints(
+    case: Case, rows: Sequence[Row], torques: Mapping[str, FloatArray], results: Mapping[str, ReferenceResult]
+) -> list[str]:
+    """What the errors of candidates that fail look like, where they have a familiar shape."""
+    failed = dict.fromkeys((row.candidate, row.reference) for row in rows if row.verdict in FAILURES)
+    said = []
+    for name, reference in failed:
+        words = hint_of(torques[name], results[reference].tau, case.motion.t, case.mechanism.joints)
+        said += [f'candidate "{name}" against "{reference}": {words}'] if words else []
+    return said
 
 
 def _refuse_other_branch(case: Case, x: FloatArray) -> None:
