@@ -151,7 +151,7 @@ def _spread(case: Case, results: Mapping[str, ReferenceResult]) -> dict[str, dic
     engine = PinocchioReference(case.model, setup=case.setup, **case.overrides)
     spread: dict[str, dict[str, float]] = {}
     for name, result in results.items():
-        tau = engine.inverse_dynamics(motion.q, motion.qd, motion.qdd, name, case.force).tau
+        tau = engine.inverse_dynamics(motion.q, motion.qd, motion.qdd, name, case.force, ordered=True).tau
         reaction = largest_reaction(result.reactions.values())
         spread[name] = {
             joint: joint_error(tau[:, i], result.tau[:, i], reaction).peak_error
