@@ -231,6 +231,28 @@ def test_a_way_through_a_pose_in_which_the_actuators_lose_hold_is_refused(tmp_pa
     assert reference.reach([[0.9 * start], [-start]], ["ry"]).reachable.tolist() == [True, False]
 
 
+def test_coordinates_that_do_not_lead_back_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    reference, names, reach = robot("rrr", tmp_path)
+    x = motion(reference, names, reach, n=5)[0]
+    closer = reference._platform_closer(names.split())
+    elsewhere = x.copy()
+    elsewhere[3, 0] += 1e-6
+    monkeypatch.setattr(reference, "_assemble", lambda q: closer.follow(elsewhere))
+    with pytest.raises(MotionError, match=r"sample 3: .* is on another assembly branch") as refusal:
+        reference.inverse_kinematics(x, names.split())
+    assert refusal.value.facts["sample"] == 3
+
+    def blocked(q: np.ndarray) -> None:
+        raise MotionError("sample 2, joint q1: blocked", sample=2, joint="q1")
+
+    monkeypatch.setattr(reference, "_assemble", blocked)
+    with pytest.raises(
+        MotionError, match=r"sample 2: the platform can be at x = .*straight from the home pose"
+    ) as refusal:
+        reference.inverse_kinematics(x, names.split())
+    assert refusal.value.facts["value"] == x[2].tolist()
+
+
 # --- redundant actuation ----------------------------------------------------------------------------------------------
 
 
