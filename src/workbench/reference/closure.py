@@ -105,7 +105,7 @@ class LoopCloser(OrderedClosure):
         )
         raise MotionError(
             f"sample {sample}, joint {self.structure.joint_names[joint]}: the loops cannot be closed at {shown}; the"
-            f" way from the home pose ends at {reached[joint]:.6g}",
+            f" way there ends at {reached[joint]:.6g}",
             sample=sample,
             joint=self.structure.joint_names[joint],
             value=target.tolist(),
