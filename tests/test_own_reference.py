@@ -9,7 +9,7 @@ import pytest
 
 from own_mechanisms import FOURBAR, PARALLELOGRAM
 from workbench.campaign.robot_spec import RobotKeys
-from workbench.capabilities.robot import robot_with
+from workbench.capabilities.load import robot_with
 from workbench.errors import ModelError, MotionError, WorkbenchError
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference

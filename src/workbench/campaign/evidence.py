@@ -138,7 +138,7 @@ def gather_evidence(
     if not effort.budget:
         return Evidence(spread=spread, times=motion.t)
     power = {
-        name: power_balance(reference, motion.q, motion.qd, motion.qdd, name, force, tau=result.tau)
+        name: power_balance(reference, motion.q, motion.qd, motion.qdd, name, force, tau=result.tau, along=motion.t)
         for name, result in results.items()
     }
     return Evidence(power, spread, _replays(case, reference, candidates), motion.t)
@@ -151,7 +151,7 @@ def _spread(case: Case, results: Mapping[str, ReferenceResult]) -> dict[str, dic
     engine = PinocchioReference(case.model, loaded=case.robot.loaded)
     spread: dict[str, dict[str, float]] = {}
     for name, result in results.items():
-        tau = engine.inverse_dynamics(motion.q, motion.qd, motion.qdd, name, case.force).tau
+        tau = engine.inverse_dynamics(motion.q, motion.qd, motion.qdd, name, case.force, ordered=True).tau
         reaction = largest_reaction(result.reactions.values())
         spread[name] = {
             joint: joint_error(tau[:, i], result.tau[:, i], reaction).peak_error

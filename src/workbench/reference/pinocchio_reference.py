@@ -112,6 +112,7 @@ class PinocchioReference:
         qdd: ArrayLike,
         mass_model: str = "distributed",
         external_force: ArrayLike | None = None,
+        ordered: bool = False,
     ) -> PinocchioResult:
         """Actuator forces that produce a motion.
 
@@ -124,6 +125,8 @@ class PinocchioReference:
             ``"distributed"``, the model as it is, or ``"lumped"``, bars without rotational inertia.
         external_force
             Newtons, base (paper) frame, acting on the platform site: ``(3,)`` or ``(n, 3)``.
+        ordered
+            The samples are one motion, in the order of time: each is closed from its predecessor.
 
         Raises
         ------
@@ -141,7 +144,7 @@ class PinocchioReference:
         model = self._model(mass_model)
         data = model.createData()
         damping, friction = np.array(model.damping), np.array(model.friction)
-        configurations, closure = loops.close(q)
+        configurations, closure = loops.close(q, ordered)
         base = self._base()
         tau, motion = np.zeros((n, na)), np.zeros((3, n, 3))
         residuals, ranks = np.zeros((2, n)), np.zeros(n, dtype=np.int64)

@@ -64,11 +64,14 @@ class PlatformSide(ABC):
         qdd: ArrayLike,
         mass_model: str = "distributed",
         external_force: ArrayLike | None = None,
+        *,
+        along: ArrayLike | None = None,
+        near: ArrayLike | None = None,
     ) -> ReferenceResult:
         """Everything about an actuated motion."""
 
     @abstractmethod
-    def _assemble(self, q: FloatArray) -> Assembly:
+    def _assemble(self, q: FloatArray, ordered: bool = False, near: ArrayLike | None = None) -> Assembly:
         """Closed configurations for actuated coordinates ``(n, na)``."""
 
     def joint_motion(
