@@ -16,8 +16,8 @@ from workbench._version import __version__
 
 if TYPE_CHECKING:
     from workbench.capabilities.load import load_robot
-from workbench.capabilities.robot import Robot
     from workbench.capabilities.load import load_robot as load_mechanism
+    from workbench.capabilities.robot import Robot
     from workbench.errors import WorkbenchError
     from workbench.reference import MujocoReference
     from workbench.report.frames import load_run
