@@ -183,6 +183,28 @@ class MujocoReference:
         """
         return self._engine(mass_model).model
 
+    def with_model(self, model: mujoco.MjModel) -> MujocoReference:
+        """The same mechanism with other masses: *model* differs from the compiled one in nothing else."""
+        other = copy.copy(self)
+        other._engines = {"distributed": Engine(model, self._threads, self._structure.frames)}
+        if self._leader:
+            other._leader = self._leader[0].with_model(model), self._leader[1]
+        return other
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the results should know of the model, one line each."""
+        found = self._structure.notes
+        if self._closer.tolerance.few_digits:
+            found += (
+                "loops that agree only to some digits: they are closed by least squares, open by"
+                f" {float(self._closer.at_home.residual[0]):.2g} m at home; what that is worth in torque is in the"
+                " error budget",
+            )
+        if self._structure.friction.passive.any():
+            found += ("dry friction of a passive joint that rests counts as zero, the middle of what it may be",)
+        return found
+
     def mobility(self) -> Mobility:
         """Count freedoms and redundant rows by rank at the home pose."""
         structure = self._structure
