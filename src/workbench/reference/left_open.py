@@ -61,6 +61,7 @@ def _with_round_rods(reference: MujocoReference) -> mujoco.MjModel | None:
         body.explicitinertial = True
         body.mass = model.body_mass[rod.body]
         body.ipos, body.iquat = place, [1.0, 0.0, 0.0, 0.0]
+        body.inertia = [0.0, 0.0, 0.0]
         body.fullinertia = [inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
     if not changed:
         return None
