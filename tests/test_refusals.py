@@ -99,8 +99,8 @@ def test_limits_that_a_motion_leaves_are_named() -> None:
 def test_limits_of_ball_joints_and_fixed_tendons() -> None:
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><compiler angle="radian"/><worldbody><body><joint name="ball" type="ball" range="0 0.5"/>'
-        '<geom size=".1"/></body><body><joint name="a"/><geom size=".1"/></body></worldbody><tendon><fixed name="t" range="-1 1"><joint'
-        ' joint="a" coef="3"/></fixed></tendon></mujoco>'
+        '<geom size=".1"/></body><body><joint name="a"/><geom size=".1"/></body></worldbody><tendon>'
+        '<fixed name="t" range="-1 1"><joint joint="a" coef="3"/></fixed></tendon></mujoco>'
     )
     turned = np.array([[np.cos(0.3), 0.0, np.sin(0.3), 0.0, 0.4]])
     ball, tendon = limits_left(model, turned)
