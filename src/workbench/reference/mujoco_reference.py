@@ -199,8 +199,8 @@ class MujocoReference:
             gap = float(self._closer.at_home.residual[0])
             at_home = f", open by {gap:.2g} m at home" if gap > self._closer.tolerance.closed else ""
             found += (
-                f"loops that agree only to some digits: they are closed by least squares{at_home}; what that is worth in"
-                " torque is in the error budget",
+                f"loops that agree only to some digits: they are closed by least squares{at_home}; what that is worth"
+                " in torque is in the error budget",
             )
         if self._structure.friction.passive.any():
             found += ("dry friction of a passive joint that rests counts as zero, the middle of what it may be",)
