@@ -21,14 +21,17 @@ from workbench.errors import ModelError, MotionError, ParameterError, did_you_me
 from workbench.mjcf.compile import custom_text
 from workbench.mjcf.setup import Setup
 from workbench.reference.body_forces import acts_on_bodies, felt_gravity
-from workbench.reference.closure import Assembly, LoopCloser
+from workbench.reference.closure import LoopCloser
+from workbench.reference.continuation import Assembly
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
 from workbench.reference.freedoms import check_freedoms, refuse_locked
 from workbench.reference.kernels import projection, velocities
+from workbench.reference.platform_closure import PlatformCloser
+from workbench.reference.platform_side import PlatformSide
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
 from workbench.reference.structure import Structure, read_structure
-from workbench.reference.tolerance import rank_of
+from workbench.reference.tolerance import few_digits_note, rank_of
 from workbench.robots.load import LoadedModel, load_model
 
 MASS_MODELS = ("distributed", "lumped")
@@ -44,6 +47,12 @@ class ReferenceResult:
     """``(n, 3)`` platform position, m"""
     xd: FloatArray
     xdd: FloatArray
+    rotation: FloatArray
+    """``(n, 3, 3)`` of the platform site: vector in the base's frame = rotation @ vector in the site's frame"""
+    omega: FloatArray
+    """``(n, 3)`` angular velocity of the platform, rad/s"""
+    alpha: FloatArray
+    """``(n, 3)`` angular acceleration of the platform, rad/s^2"""
     reactions: dict[str, FloatArray]
     """force ``(n, 3)`` in N, base frame, that the parent exerts on the child body at each joint, and that the second
     site's body exerts on the first's at each loop closure; none where there are more actuators than freedoms, and none
@@ -80,7 +89,7 @@ class Mobility:
     """spins of rods between two spherical joints about their own axes"""
 
 
-class MujocoReference:
+class MujocoReference(PlatformSide):
     """Closed-chain inverse dynamics of an MJCF model.
 
     Parameters
@@ -126,6 +135,7 @@ class MujocoReference:
         self._reaction_rows = reaction_rows(loaded.model, self._structure)
         self._leader: tuple[MujocoReference, np.ndarray] | None = None
         self._closed: tuple[FloatArray, Assembly] | None = None
+        self._platform: dict[tuple[str, ...], PlatformCloser] = {}
         self._base_rotation = np.eye(3)
         self._locate_base()
         self._check_freedoms()
@@ -196,12 +206,7 @@ class MujocoReference:
         """What a reader of the results should know of the model, one line each."""
         found = self._structure.notes
         if self._closer.tolerance.few_digits:
-            gap = float(self._closer.at_home.residual[0])
-            at_home = f", open by {gap:.2g} m at home" if gap > self._closer.tolerance.closed else ""
-            found += (
-                f"loops that agree only to some digits: they are closed by least squares{at_home}; what that is worth"
-                " in torque is in the error budget",
-            )
+            found += (few_digits_note(self._closer.tolerance, float(self._closer.at_home.residual[0])),)
         if self._structure.friction.passive.any():
             found += ("dry friction of a passive joint that rests counts as zero, the middle of what it may be",)
         return found
@@ -258,6 +263,7 @@ class MujocoReference:
         model, assembly = engine.model, self._assemble(q)
         qpos, (qvel, qacc) = assembly.qpos, np.zeros((2, n, model.nv))
         tau, motion, energy = np.zeros_like(q), np.zeros((3, n, 3)), np.zeros((n, 2))
+        turning = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         velocity_residual, acceleration_residual = np.zeros((2, n))
         # the kernel fills a row for every body, also for fixed ones that follow the last joint
         reactions = np.zeros((len(structure.blocks) + model.nbody, n, 3))
@@ -279,7 +285,8 @@ class MujocoReference:
                 *self._tables, poses.tables, dynamics.tables, self._mass_layout, platform, masses, gravity,
                 self._base_rotation, self._base_position, qpos[rows], qvel[rows], assembly.tangent[rows], qdd[rows],
                 force[rows], qacc[rows], tau[rows], velocity_residual[rows], acceleration_residual[rows],
-                motion[:, rows], reactions[:, rows], slack[rows],
+                motion[:, rows], (turning[0][rows], turning[1][rows], turning[2][rows]), reactions[:, rows],
+                slack[rows],
             )  # fmt: skip
             energy[rows] = dynamics.energy[: rows.stop - rows.start]
 
@@ -289,7 +296,8 @@ class MujocoReference:
         tau += friction.actuated * direction(qd)
         known = {} if acts_on_bodies(model) else named(self._reaction_rows, reactions)
         return ReferenceResult(
-            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], reactions=known,
+            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], rotation=turning[0], omega=turning[1],
+            alpha=turning[2], reactions=known,
             closure_residual=assembly.residual.copy(), velocity_residual=velocity_residual,
             acceleration_residual=acceleration_residual, rank=assembly.rank.copy(),
             condition=assembly.condition.copy(), energy=energy, qpos=qpos.copy(), qvel=qvel, qacc=qacc,
@@ -371,7 +379,7 @@ class MujocoReference:
     def _led_by(self, structure: Structure) -> MujocoReference:
         """The same model, driven by fewer of its actuators."""
         led = copy.copy(self)
-        led._structure, led._leader, led._closed = structure, None, None
+        led._structure, led._leader, led._closed, led._platform = structure, None, None, {}
         led._closer = LoopCloser(self._engines["distributed"], structure)
         tables = led._closer.tables
         led._tables = tables.closures, tables.joints, tables.split, tables.bodies

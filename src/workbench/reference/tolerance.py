@@ -107,3 +107,23 @@ def rank_of(jacobian: FloatArray, tolerance: Tolerance) -> int:
         values = np.linalg.svd(jacobian, compute_uv=False)
         return int(np.count_nonzero(values > tolerance.relative * values[0]))
     return int(np.linalg.matrix_rank(jacobian, tol=RANK * tolerance.size))
+
+
+def few_digits_note(tolerance: Tolerance, gap: float) -> str:
+    """What a reader should know of loops of few digits that are open by *gap* metres at home."""
+    at_home = f", open by {gap:.2g} m at home" if gap > tolerance.closed else ""
+    return (
+        f"loops that agree only to some digits: they are closed by least squares{at_home}; what that is worth in torque"
+        " is in the error budget"
+    )
+
+
+def weights_of(model: mujoco.MjModel, size: float) -> tuple[FloatArray, FloatArray]:
+    """What a unit of each velocity ``(nv,)`` and of each coordinate ``(nq,)`` counts: lengths by the robot's size."""
+    velocities, coordinates = np.ones(model.nv), np.ones(model.nq)
+    for joint in range(model.njnt):
+        kind = mujoco.mjtJoint(model.jnt_type[joint])
+        lengths = {mujoco.mjtJoint.mjJNT_SLIDE: 1, mujoco.mjtJoint.mjJNT_FREE: 3}.get(kind, 0)
+        for array, first in ((velocities, model.jnt_dofadr[joint]), (coordinates, model.jnt_qposadr[joint])):
+            array[first : first + lengths] = 1.0 / size
+    return velocities, coordinates
