@@ -326,7 +326,8 @@ class MujocoReference(PlatformSide):
                     " bars that lose their rotational inertia",
                     file=self.file,
                 )
-            known = [self._engines["distributed"].model.body(i).name for i in range(1, self._nbody)]
+            whole = self._engines["distributed"].model
+            known = [whole.body(i).name for i in range(1, whole.nbody)]
             for name in names.split():
                 if name not in known:
                     raise ModelError(
@@ -339,10 +340,6 @@ class MujocoReference(PlatformSide):
                 self._structure.frames,
             )
         return self._engines[mass_model]
-
-    @property
-    def _nbody(self) -> int:
-        return int(self._engines["distributed"].model.nbody)
 
     def _assemble(self, q: FloatArray) -> Assembly:
         if self._closed is None or not np.array_equal(self._closed[0], q):
