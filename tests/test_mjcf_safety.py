@@ -14,7 +14,8 @@ import pytest
 
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, WorkbenchError
-from workbench.mjcf.safety import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
+from workbench.mjcf.files import MAX_BYTES
+from workbench.mjcf.safety import MAX_DEPTH, MAX_ELEMENTS
 from workbench.reference.check import check_model
 from workbench.robots.edit import edit_file
 from workbench.robots.load import load_model, open_model

@@ -76,8 +76,8 @@ class CaseResult:
     facts: dict[str, Any] = field(repr=False)
     faults: Sequence[Fault] = ()
     """what the user's candidates did wrong"""
-    model_text: str = field(default="", repr=False)
-    """MJCF of the reference, the case's parameters written into it"""
+    model: Any = field(default=None, repr=False)
+    """MuJoCo's model of the reference, the case's parameters in it; with drawings only"""
     qpos: FloatArray | None = field(default=None, repr=False)
     """``(n, nq)`` its poses, MuJoCo's own coordinates; with drawings only"""
 
@@ -129,9 +129,9 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for point, place in drawing.points.items():
             series |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
-    poses = first.qpos if effort.drawing else None
+    poses, drawn = (first.qpos, reference.compiled()) if effort.drawing else (None, None)
     faults = tuple(computed.faults.values())
-    return CaseResult(case.name, rows, series, computed.noted(facts), faults, reference.text, poses)
+    return CaseResult(case.name, rows, series, computed.noted(facts), faults, drawn, poses)
 
 
 def _refuse_other_branch(case: Case, x: FloatArray) -> None:

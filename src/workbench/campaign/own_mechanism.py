@@ -18,6 +18,10 @@ class OwnMechanism(Strict):
     actuated: Annotated[list[str], Field(min_length=1)] | None = None
     """joints that are driven, in the order of q and tau"""
     platform_site: str | None = None
+    platform_body: str | None = None
+    """the body whose origin is the platform, in place of a site"""
+    fix_base: str | None = None
+    """body on a free joint that stands still: the base of a robot that walks"""
     base_body: str | None = None
     """fixed body in whose frame the platform is seen; the world where not said"""
     keyframe: str | None = None
@@ -30,12 +34,15 @@ class OwnMechanism(Strict):
 
     @model_validator(mode="after")
     def _whole(self) -> OwnMechanism:
-        if (self.actuated is None) != (self.platform_site is None):
+        if self.platform_site is not None and self.platform_body is not None:
+            raise ValueError("platform_site and platform_body: the platform is one of them")
+        if (self.actuated is None) != (self.platform_site is None and self.platform_body is None):
             raise ValueError(
-                "actuated and platform_site go together: the joints that are driven, the site that is moved"
+                "actuated and platform_site (or platform_body) go together: the joints that are driven, the site or"
+                " body that is moved"
             )
         if self.actuated is None:
-            for key in ("base_body", "keyframe", "initial", "lumped_bodies", "ignore", "read"):
+            for key in ("fix_base", "base_body", "keyframe", "initial", "lumped_bodies", "ignore", "read"):
                 if getattr(self, key):
                     raise ValueError(f"{key} goes with actuated and platform_site")
         return self
@@ -43,11 +50,13 @@ class OwnMechanism(Strict):
     @property
     def setup(self) -> Setup | None:
         """The same for the reference; None for a built-in robot."""
-        if self.actuated is None or self.platform_site is None:
+        if self.actuated is None:
             return None
         return Setup(
             actuated=tuple(self.actuated),
-            platform_site=self.platform_site,
+            platform_site=self.platform_site or "",
+            platform_body=self.platform_body or "",
+            fix_base=self.fix_base or "",
             base_body=self.base_body or "world",
             keyframe=self.keyframe or "",
             initial=tuple(self.initial.items()),

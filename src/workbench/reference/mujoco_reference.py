@@ -113,7 +113,7 @@ class MujocoReference:
     ) -> None:
         loaded = loaded or load_model(path, parameters, setup)
         self.file = loaded.file
-        self._text = loaded.text
+        self.loaded = loaded
         self._threads = threads
         self._structure = read_structure(loaded.model, loaded.file)
         self._engines = {"distributed": Engine(loaded.model, threads)}
@@ -156,8 +156,12 @@ class MujocoReference:
 
     @property
     def text(self) -> str:
-        """The MJCF with the overrides written into it."""
-        return self._text
+        """The MJCF with the overrides written into it; what a campaign says of it is in `spec` only."""
+        return self.loaded.text
+
+    def spec(self) -> mujoco.MjSpec:
+        """A fresh specification of the model, to be changed and compiled."""
+        return self.loaded.spec()
 
     @property
     def structure(self) -> Structure:
@@ -292,7 +296,7 @@ class MujocoReference:
                         file=self.file,
                     )
             self._engines[mass_model] = Engine(
-                without_bar_inertia(self._text, tuple(names.split()), self.file), self._threads
+                without_bar_inertia(self.spec(), tuple(names.split()), self.file), self._threads
             )
         return self._engines[mass_model]
 

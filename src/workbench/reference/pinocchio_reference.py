@@ -20,7 +20,7 @@ from workbench.mjcf.setup import Setup
 from workbench.reference.pinocchio_loops import PinocchioLoops
 from workbench.reference.pinocchio_reader import import_pinocchio, read, without_inertia
 from workbench.reference.structure import CONNECT, SPIN, WELD, read_structure
-from workbench.robots.load import load_model
+from workbench.robots.load import LoadedModel, load_model
 
 MASS_MODELS = ("distributed", "lumped")
 
@@ -82,7 +82,7 @@ class PinocchioReference:
         sites = {structure.platform_site}
         for kind, _, _, one, two in structure.blocks.tolist():
             sites |= {one, two} if kind in (CONNECT, WELD) else {one} if kind == SPIN else set()
-        self._reading = read(self._pin, loaded.text, loaded.model, sites, loaded.file)
+        self._reading = read(self._pin, _flat(loaded), loaded.model, sites, loaded.file)
         self._loops = PinocchioLoops(self._pin, self._reading, structure, loaded.model)
         self._models: dict[str, Any] = {"distributed": self._reading.model}
 
@@ -203,3 +203,8 @@ class PinocchioReference:
             sample=sample,
             value=q.tolist(),
         )
+
+
+def _flat(loaded: LoadedModel) -> str:
+    """The file's text with its includes in it; Pinocchio would look for them elsewhere."""
+    return loaded.prepared.source.text if loaded.prepared else loaded.text

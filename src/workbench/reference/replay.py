@@ -240,7 +240,7 @@ class _Runner:
         """Tracking errors ``(candidates * factors, steps / every, na)``: joint coordinates less those of the motion."""
         structure = self._reference.structure
         step = window / steps
-        model = near_rigid(self._reference.text, step)
+        model = near_rigid(self._reference.spec(), step)
         middle = self._motion_at(_times(self._start + 0.5 * step, step, steps))
         applied = np.zeros((len(torques) * len(factors), steps, model.nv))
         for i, (name, torque) in enumerate(torques.items()):
@@ -294,9 +294,8 @@ def _times(first: float, step: float, count: int) -> FloatArray:
 
 
 @engine_warnings()
-def near_rigid(text: str, step: float) -> mujoco.MjModel:
-    """Compile an MJCF for forward simulation at a step in seconds, loops and dry friction as stiff as it allows."""
-    spec = mujoco.MjSpec.from_string(text)
+def near_rigid(spec: mujoco.MjSpec, step: float) -> mujoco.MjModel:
+    """Compile *spec* for forward simulation at a step in seconds, loops and dry friction as stiff as it allows."""
     option = spec.option
     option.timestep = step
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST

@@ -26,9 +26,8 @@ MOST_FRAMES = 6000
 class Poses:
     """Poses of a model."""
 
-    text: str
-    """MJCF, parameters of the case written into it"""
     model: mujoco.MjModel
+    """parameters of the case written into it"""
     qpos: FloatArray = field(repr=False)
     """``(n, nq)``"""
     times: FloatArray = field(repr=False)
@@ -51,7 +50,7 @@ def home_pose(path: Path) -> Poses:
         model = loaded.model
         home = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, "home")
         qpos = np.array(model.key_qpos[home] if home >= 0 else model.qpos0, dtype=np.float64)
-    return Poses(loaded.text, loaded.model, qpos[None, :], np.zeros(1), f"{loaded.file}, home pose")
+    return Poses(loaded.model, qpos[None, :], np.zeros(1), f"{loaded.file}, home pose")
 
 
 def motion_poses(
@@ -93,4 +92,4 @@ def motion_poses(
     times = start + step * np.arange(int(count) + 1, dtype=np.float64)
     reference = MujocoReference(path, threads=1, loaded=None, setup=found.setup, **found.overrides)
     qpos = reference.inverse_dynamics(*course_of(found)(times)).qpos
-    return Poses(reference.text, reference.compiled(), qpos, times, f"{path}, {found.name}")
+    return Poses(reference.compiled(), qpos, times, f"{path}, {found.name}")

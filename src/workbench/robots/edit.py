@@ -109,7 +109,7 @@ def edit_file(
     wanted = changed_parameters(loaded.kind, loaded.values, given)
     refuse_impossible_bodies(loaded.model, loaded.kind, loaded.file, loaded.values, wanted)
     text = rewrite(loaded.text, loaded.file, loaded.kind, loaded.values, wanted)
-    confirm(load_text(text, loaded.file).model, loaded.kind, loaded.file, wanted)
+    confirm(load_text(text, loaded.file, source.parent).model, loaded.kind, loaded.file, wanted)
     _write(target, text, source)
     units = {name: info.unit for name, info in stored_names(loaded.kind.parameter_table).items()}
     moved = tuple(

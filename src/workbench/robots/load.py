@@ -15,9 +15,10 @@ from pathlib import Path
 import mujoco
 
 from workbench.errors import ModelError, ParameterError, did_you_mean
-from workbench.mjcf.compile import compile_text, custom_text, find_model
-from workbench.mjcf.safety import read_text
-from workbench.mjcf.setup import Setup, prepare
+from workbench.mjcf.compile import custom_text, find_model
+from workbench.mjcf.files import read_text
+from workbench.mjcf.prepared import Prepared, open_source, prepare
+from workbench.mjcf.setup import Setup
 from workbench.mjcf.text import Element, scan
 from workbench.robots import MECHANISMS, mechanism_class
 from workbench.robots.assumptions.check import Context, refuse_broken
@@ -41,6 +42,24 @@ class LoadedModel:
     """its parameters by stored name; None where they cannot be read"""
     problem: str = ""
     """why they cannot be read, one line"""
+    prepared: Prepared | None = None
+    """the file with all that it reads, and how its specification is made"""
+
+    def spec(self) -> mujoco.MjSpec:
+        """A fresh specification of `model`, to be changed and compiled."""
+        if self.prepared is None:
+            raise ModelError(f"{self.file}: was not loaded from a text", file=self.file)
+        return self.prepared.spec()
+
+    @property
+    def user(self) -> mujoco.MjModel:
+        """The file as it lies, compiled: with contacts, limits, actuators."""
+        return self.prepared.user if self.prepared else self.model
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of results has to know of the file."""
+        return self.prepared.notes if self.prepared else ()
 
 
 def load_model(
@@ -65,12 +84,16 @@ def load_model(
         An override that does not exist or has a value it may not have.
     """
     file = str(path)
-    text = read_text(find_model(path))
+    found = find_model(path)
+    text = read_text(found)
     if setup:
-        text = prepare(text, file, setup, compile_text)
+        prepared = prepare(text, file, found.parent, setup)
+        if overrides:
+            raise ModelError(f"{file}: parameters cannot be set; edit the MJCF, which both sides read", file=file)
+        return LoadedModel(file, text, prepared.model, None, prepared=prepared)
     if not overrides:
-        return load_text(text, file)
-    base = _read_once(text, file)
+        return load_text(text, file, found.parent)
+    base = _read_once(text, file, found.parent)
     if base.kind is None or base.values is None:
         raise ModelError(
             f'{file}: parameters cannot be set, <custom> has no <text name="mechanism"> that says what they mean',
@@ -79,11 +102,14 @@ def load_model(
     wanted = changed_parameters(base.kind, base.values, overrides)
     refuse_impossible_bodies(base.model, base.kind, file, base.values, wanted)
     text = rewrite(text, file, base.kind, base.values, wanted, base.elements)
-    model = compile_text(text, file)
+    prepared = open_source(text, file, found.parent)
+    model = prepared.model
     confirm(model, base.kind, file, wanted)
     # the file's structure was checked once; only numbers that are parameters' own have changed since
     refuse_broken(Context(model, base.kind, file, text), wanted)
-    return LoadedModel(file, text, model, base.kind(base.kind.parameter_type(**wanted)), base.kind, wanted)
+    return LoadedModel(
+        file, text, model, base.kind(base.kind.parameter_type(**wanted)), base.kind, wanted, prepared=prepared
+    )
 
 
 def plan_mechanism(path: str | Path, overrides: Mapping[str, float]) -> Mechanism | None:
@@ -96,7 +122,8 @@ def plan_mechanism(path: str | Path, overrides: Mapping[str, float]) -> Mechanis
     ModelError, ParameterError
         The file itself cannot be loaded, or as `Mechanism.with_parameters`.
     """
-    base = _read_once(read_text(find_model(path)), str(path))
+    found = find_model(path)
+    base = _read_once(read_text(found), str(path), found.parent)
     if base.kind is None or base.values is None:
         return None
     return base.kind(base.kind.parameter_type(**changed_parameters(base.kind, base.values, overrides)))
@@ -111,17 +138,19 @@ def open_model(path: str | Path) -> LoadedModel:
         The file cannot be read, is not safe, or does not compile; or it names an unknown mechanism.
     """
     file = str(path)
-    text = read_text(find_model(path))
+    found = find_model(path)
+    text = read_text(found)
     elements = scan(text, file)
-    model = compile_text(text, file)
+    prepared = open_source(text, file, found.parent)
+    model = prepared.model
     kind = _kind(model, file)
     if kind is None:
-        return LoadedModel(file, text, model, None)
+        return LoadedModel(file, text, model, None, prepared=prepared)
     try:
         values = read_parameters(model, kind, file, text, elements)
-        return LoadedModel(file, text, model, kind(kind.parameter_type(**values)), kind, values)
+        return LoadedModel(file, text, model, kind(kind.parameter_type(**values)), kind, values, prepared=prepared)
     except (ModelError, ParameterError) as error:
-        return LoadedModel(file, text, model, None, kind, None, str(error))
+        return LoadedModel(file, text, model, None, kind, None, str(error), prepared)
 
 
 def load_mechanism(path: str | Path, **parameters: float) -> Mechanism:
@@ -204,14 +233,16 @@ class _Read:
 
 
 @lru_cache(maxsize=8)
-def _read_once(text: str, file: str) -> _Read:
+def _read_once(text: str, file: str, folder: Path) -> _Read:
     """What a sweep over one file needs of it again and again."""
-    loaded = load_text(text, file)
+    loaded = load_text(text, file, folder)
     return _Read(loaded.model, loaded.kind, loaded.values, scan(text, file))
 
 
-def load_text(text: str, file: str) -> LoadedModel:
+def load_text(text: str, file: str, folder: Path | None = None) -> LoadedModel:
     """Load an MJCF text as `load_model` does a file; *file* is the name under which errors speak of it.
+
+    *folder* is the directory from which it may read; None: it reads nothing.
 
     Raises
     ------
@@ -219,15 +250,16 @@ def load_text(text: str, file: str) -> LoadedModel:
         See `load_model`.
     """
     elements = scan(text, file)
-    model = compile_text(text, file)
+    prepared = open_source(text, file, folder)
+    model = prepared.model
     kind = _kind(model, file)
     if kind is None:
-        return LoadedModel(file, text, model, None)
+        return LoadedModel(file, text, model, None, prepared=prepared)
     context = Context(model, kind, file, text)
     refuse_broken(context, None)
     values = read_parameters(model, kind, file, text, elements)
     refuse_broken(context, values)
-    return LoadedModel(file, text, model, kind(kind.parameter_type(**values)), kind, values)
+    return LoadedModel(file, text, model, kind(kind.parameter_type(**values)), kind, values, prepared=prepared)
 
 
 def _kind(model: mujoco.MjModel, file: str) -> type[Mechanism] | None:
