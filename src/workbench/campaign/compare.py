@@ -19,6 +19,7 @@ from workbench.campaign.unloaded import joint_error, largest_reaction, normalise
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdict_of
 from workbench.errors import ModelError, MotionError
 from workbench.reference import MujocoReference, ReferenceResult
+from workbench.reference.left_out import look, refuse_crossings, worth
 from workbench.reference.raw_inverse import raw_mj_inverse
 from workbench.reference.skeleton import skeleton
 
@@ -103,6 +104,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         torques = computed.torques
     except MotionError as error:
         raise at_time(error, motion.t) from error
+    left = _left_out(case, reference, next(iter(results.values())))
     _refuse_other_branch(case, next(iter(results.values())).x)
     sound = [name for name in torques if name not in computed.faults]
     evidence = gather_evidence(case, reference, results, sound, effort)
@@ -124,6 +126,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual
     facts = _facts(case, reference, first, rows) | {"evidence": evidence.facts()}
+    facts["warnings"] = [*facts["warnings"], *left]
     if effort.drawing:
         drawing = skeleton(reference, first.qpos)
         for point, place in drawing.points.items():
@@ -132,6 +135,23 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     poses, drawn = (first.qpos, reference.compiled()) if effort.drawing else (None, None)
     faults = tuple(computed.faults.values())
     return CaseResult(case.name, rows, series, computed.noted(facts), faults, drawn, poses)
+
+
+def _left_out(case: Case, reference: MujocoReference, result: ReferenceResult) -> tuple[str, ...]:
+    """What a reader has to know of the file and of what is left out of it.
+
+    Raises
+    ------
+    MotionError
+        The motion meets a limit or a contact that is left out, and the campaign does not say that it may.
+    """
+    ignore = case.setup.ignore if case.setup else ()
+    motion = case.motion
+    try:
+        notes = refuse_crossings(look(reference, result), ignore, motion.t)
+    except MotionError as error:
+        raise at_time(error, motion.t) from error
+    return (*reference.loaded.notes, *notes, *worth(reference, ignore, (motion.q, motion.qd, motion.qdd), result.tau))
 
 
 def _refuse_other_branch(case: Case, x: FloatArray) -> None:

@@ -51,12 +51,12 @@ def compiler_changes(source: Source) -> tuple[str, ...]:
         other = parse(source)
         OPTIONS[name][1](other.compiler)
         try:
+            reason = ""
             with engine_warnings():
                 without = _bodies(other.compile())
         except (ValueError, mujoco.FatalError) as error:
-            reason = " ".join(str(error).split())
-            notes.append(f'<compiler {name}> makes another robot than the file\'s numbers: without it "{reason}"')
-            continue
+            without = _authored(parse(source), as_is)
+            reason = f'; without it MuJoCo says "{" ".join(str(error).split())}"'
         if set(without) != set(as_is):
             notes.append(f"<compiler {name}> makes another robot than the file's numbers: bodies differ")
             continue
@@ -68,9 +68,18 @@ def compiler_changes(source: Source) -> tuple[str, ...]:
             more = f" and {len(order) - NAMED} more" if len(order) > NAMED else ""
             notes.append(
                 f"<compiler {name}> makes another robot than the file's numbers: mass or inertia of {shown}{more};"
-                " the workbench counts what MuJoCo compiles"
+                f" the workbench counts what MuJoCo compiles{reason}"
             )
     return tuple(notes)
+
+
+def _authored(spec: mujoco.MjSpec, compiled: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Mass and inertia as they are written, where they are."""
+    found = dict(compiled)
+    for body in spec.bodies:
+        if body.explicitinertial and body.name in found and np.isnan(body.fullinertia).any():
+            found[body.name] = np.array([body.mass, *body.inertia])
+    return found
 
 
 def _bodies(model: mujoco.MjModel) -> dict[str, FloatArray]:

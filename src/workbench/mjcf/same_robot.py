@@ -14,6 +14,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError
+from workbench.mjcf.free_joints import user_qpos
 from workbench.mjcf.setup import OWN_TEXTS, PLATFORM, Preparation
 
 BODIES = ("body_parentid", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia",
@@ -174,24 +175,16 @@ class _Check:
         """The same state of both models, and the user's velocities per velocity of the prepared one."""
         user, prepared = self.user, self.prepared
         mujoco.mj_normalizeQuat(prepared, qpos)
+        theirs = user_qpos(user, prepared, self.plan.free, qpos)
         turn = np.zeros((user.nv, prepared.nv))
-        theirs = np.array(user.qpos0)
         for old, new in zip(self.kept, self.same, strict=True):
-            a, b = int(user.jnt_qposadr[old]), int(prepared.jnt_qposadr[new])
-            size = {mujoco.mjtJoint.mjJNT_FREE: 7, mujoco.mjtJoint.mjJNT_BALL: 4}
-            n = size.get(mujoco.mjtJoint(user.jnt_type[old]), 1)
-            theirs[a : a + n] = qpos[b : b + n]
             c, d = int(user.jnt_dofadr[old]), int(prepared.jnt_dofadr[new])
-            m = n - 1 if n > 1 else 1
-            turn[c : c + m, d : d + m] = np.eye(m)
+            width = {mujoco.mjtJoint.mjJNT_FREE: 6, mujoco.mjtJoint.mjJNT_BALL: 3}
+            n = width.get(mujoco.mjtJoint(user.jnt_type[old]), 1)
+            turn[c : c + n, d : d + n] = np.eye(n)
         for split in self.plan.free.split:
-            a, c = int(user.jnt_qposadr[split.joint]), int(user.jnt_dofadr[split.joint])
             first = mujoco.mj_name2id(prepared, mujoco.mjtObj.mjOBJ_JOINT, split.names[0])
-            b, d = int(prepared.jnt_qposadr[first]), int(prepared.jnt_dofadr[first])
-            theirs[a : a + 3] = user.qpos0[a : a + 3] + qpos[b : b + 3]
-            whole = np.zeros(4)
-            mujoco.mju_mulQuat(whole, user.qpos0[a + 3 : a + 7], qpos[b + 3 : b + 7])
-            theirs[a + 3 : a + 7] = whole
+            c, d = int(user.jnt_dofadr[split.joint]), int(prepared.jnt_dofadr[first])
             turn[c : c + 6, d : d + 6] = np.eye(6)
         return (theirs, turn @ rates), (qpos, rates), turn
 

@@ -7,7 +7,7 @@ workbench's own models carry, so that the reference, the replay and a second eng
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -142,6 +142,7 @@ def plan(model: mujoco.MjModel, file: str, setup: Setup) -> Preparation:
         A name that the model does not have, with the nearest one; a joint that cannot be driven; an angle in degrees;
         an actuator whose rotor no joint can stand for.
     """
+    setup = _platform(model, setup)
     _check_names(model, file, setup)
     for what in setup.ignore:
         if what not in IGNORABLE:
@@ -153,6 +154,13 @@ def plan(model: mujoco.MjModel, file: str, setup: Setup) -> Preparation:
     armature = tuple((joint, float(value)) for joint, value in effects.armature.items())
     damping = tuple((joint, tuple(map(float, value))) for joint, value in effects.damping.items())
     return Preparation(setup, free, armature, damping)
+
+
+def _platform(model: mujoco.MjModel, setup: Setup) -> Setup:
+    """A platform that no site has the name of may be a body."""
+    name, obj = setup.platform_site, mujoco.mjtObj
+    named = [bool(name) and mujoco.mj_name2id(model, kind, name) >= 0 for kind in (obj.mjOBJ_SITE, obj.mjOBJ_BODY)]
+    return replace(setup, platform_site="", platform_body=name) if named == [False, True] else setup
 
 
 def start(model: mujoco.MjModel, bare: mujoco.MjModel, preparation: Preparation) -> FloatArray:

@@ -141,6 +141,12 @@ class MujocoReference:
         return tuple(bool(kind == mujoco.mjtJoint.mjJNT_SLIDE) for kind in kinds)
 
     @property
+    def home(self) -> FloatArray:
+        """``(na,)`` the driven joints where the loops are first closed."""
+        home: FloatArray = self._closer.home[self._structure.actuated_qpos].copy()
+        return home
+
+    @property
     def excess_actuators(self) -> int:
         """Actuators beyond the freedoms; where there are any, tau is of least norm and no reactions are known."""
         return len(self._structure.actuated) - len(self._leader[1]) if self._leader else 0

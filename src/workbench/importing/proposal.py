@@ -1,0 +1,174 @@
+"""What a campaign needs to say of a file, found out from the file itself and tried before it is proposed."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from workbench.arrays import FloatArray
+from workbench.errors import MotionError, WorkbenchError
+from workbench.mjcf.compile import find_model
+from workbench.mjcf.files import read_text
+from workbench.mjcf.prepared import Prepared, open_source
+from workbench.mjcf.setup import Setup
+from workbench.reference import MujocoReference
+from workbench.reference.left_out import look
+from workbench.reference.survey import Places, Survey, places, survey
+
+SAMPLES = 51
+STOP_S = 1.0
+HINGE, SLIDE = 0.2, 0.05
+"""First amplitudes: rad, and part of the model's extent in m."""
+
+HALVINGS = 8
+PARAMETERS = 12
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A small motion around the home pose: ``offset + amplitude sin(frequency t)`` per driven joint."""
+
+    offset: tuple[float, ...]
+    amplitude: tuple[float, ...]
+    frequency: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A robot made of a file; whatever writes it down needs nothing else."""
+
+    model: Path
+    setup: Setup
+    parameters: tuple[tuple[str, str], ...]
+    """name and the place where the model holds it, as in a campaign's ``read``"""
+    motion: Motion | None
+    """None where the reference refuses the file: see `problem`"""
+    survey: Survey
+    prepared: Prepared
+    notes: tuple[str, ...]
+    """why it is as it is, one line each"""
+    problem: str = ""
+    """why no motion was found, one line"""
+
+
+def propose(path: str | Path, actuated: tuple[str, ...] = ()) -> Proposal:
+    """Look at a file, and try what is proposed for it.
+
+    Parameters
+    ----------
+    path
+        An MJCF file.
+    actuated
+        Joints to drive; empty: those of the file's own actuators, as far as they are independent.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read, is not safe, or does not compile.
+    """
+    found = find_model(path)
+    prepared = open_source(read_text(found), str(path), found.parent)
+    seen = survey(prepared.user, actuated)
+    where = places(prepared.user, seen)
+    ignore = ("free bodies",) if seen.loose else ()
+    setup = Setup(
+        seen.actuated,
+        platform_site=where.site,
+        platform_body="" if where.site else where.body,
+        initial=where.initial,
+        ignore=ignore,
+        fix_base=seen.fix_base,
+    )
+    notes = list(_notes(seen))
+    parameters = _parameters(where)
+    try:
+        if not seen.actuated:
+            raise MotionError(f"{path}: no hinge or slide with a name is there to be driven; say --actuated")
+        reference = MujocoReference(path, setup=setup)
+        motion, ignored, said = _motion(reference, where)
+    except WorkbenchError as error:
+        return Proposal(found, setup, parameters, None, seen, prepared, tuple(notes), str(error))
+    setup = dataclasses.replace(setup, ignore=(*ignore, *ignored))
+    return Proposal(found, setup, parameters, motion, seen, prepared, (*notes, *said))
+
+
+def _notes(seen: Survey) -> list[str]:
+    notes = []
+    if seen.fix_base:
+        notes.append(f'the loops lie in a robot that floats: its body "{seen.fix_base}" is held still')
+    if seen.loose:
+        notes.append(f"bodies that nothing holds stand still: {', '.join(seen.loose)}")
+    if seen.dropped:
+        notes.append(f"driven by the file and not here, since they follow from the others: {', '.join(seen.dropped)}")
+    if seen.added:
+        notes.append(f"not driven by the file, but nothing else moves them: {', '.join(seen.added)}")
+    return notes
+
+
+def _parameters(where: Places) -> tuple[tuple[str, str], ...]:
+    """Masses of what moves, and gravity."""
+    found: dict[str, str] = {}
+    for body in where.moving:
+        name = "m_" + re.sub(r"\W", "_", body)[:36]
+        if body and len(body.split()) == 1 and name not in found and len(found) < PARAMETERS:
+            found[name] = f"mass {body}"
+    return (*found.items(), ("g", "gravity"))
+
+
+def _motion(reference: MujocoReference, where: Places) -> tuple[Motion, tuple[str, ...], tuple[str, ...]]:
+    """The largest of ever smaller motions that the reference follows inside limits and without new contacts.
+
+    Raises
+    ------
+    MotionError
+        Not even the smallest one can be followed.
+    """
+    home = reference.home
+    slides = np.array(reference.actuated_slides)
+    amplitude: FloatArray = np.where(slides, SLIDE * where.extent, HINGE)
+    low, high = (np.array([where.ranges.get(j, (-np.inf, np.inf))[i] for j in reference.joint_names]) for i in (0, 1))
+    amplitude = np.minimum(amplitude, np.maximum((high - low) / 4.0, 1e-4))
+    frequency: FloatArray = 3.0 + 0.5 * np.arange(len(home)) % 4.0
+    t = np.linspace(0.0, STOP_S, SAMPLES)
+    last: WorkbenchError | None = None
+    kept: tuple[Motion, tuple[str, ...], tuple[str, ...]] | None = None
+    for halving in range(HALVINGS):
+        part: FloatArray = amplitude * 0.5**halving
+        offset = np.clip(home, low + 1.01 * part, high - 1.01 * part) if np.all(low + 2.1 * part <= high) else home
+        q, qd, qdd = _sine(t, offset, part, frequency)
+        try:
+            result = reference.inverse_dynamics(q, qd, qdd)
+        except MotionError as error:
+            last = error
+            continue
+        met = tuple(dict.fromkeys(crossing.what for crossing in look(reference, result).crossings))
+        one = Motion(_digits(offset), _digits(part), _digits(frequency))
+        if not met:
+            return one, (), ()
+        said = f"even a small motion meets {' and '.join(met)} that the file has, so they are ignored"
+        kept = kept or (one, met, (said,))
+        if kept and len(met) < len(kept[1]):
+            kept = one, met, (said,)
+    if kept is None:
+        assert last is not None
+        raise last
+    return kept
+
+
+def _sine(
+    t: FloatArray, offset: FloatArray, amplitude: FloatArray, frequency: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    phase = t[:, None] * frequency
+    return (
+        offset + amplitude * np.sin(phase),
+        amplitude * frequency * np.cos(phase),
+        -amplitude * frequency**2 * np.sin(phase),
+    )
+
+
+def _digits(values: FloatArray) -> tuple[float, ...]:
+    return tuple(float(f"{value:.12g}") for value in values)
