@@ -130,7 +130,7 @@ def _limits(user: mujoco.MjModel, poses: FloatArray) -> tuple[int, list[Crossing
         return 0, []
     obj, kinds = mujoco.mjtObj, mujoco.mjtJoint
     tracks: list[tuple[str, str, FloatArray, tuple[float, float]]] = []
-    for joint in np.flatnonzero(user.jnt_limited):
+    for joint in (joint for joint in range(user.njnt) if user.jnt_limited[joint]):
         at, kind = int(user.jnt_qposadr[joint]), mujoco.mjtJoint(user.jnt_type[joint])
         name = f'joint "{_name(user, obj.mjOBJ_JOINT, joint)}"'
         unit = "m" if kind == kinds.mjJNT_SLIDE else "rad"

@@ -204,7 +204,7 @@ def _closed(model: mujoco.MjModel, still: np.ndarray) -> tuple[FloatArray, Float
     for _ in range(STEPS):
         mujoco.mj_fwdPosition(lean, data)
         equality = np.asarray(data.efc_type) == mujoco.mjtConstraint.mjCNSTR_EQUALITY.value
-        jacobian = np.array(data.efc_J).reshape(-1, model.nv)[equality]
+        jacobian = np.array(data.efc_J).reshape(-1)[: len(equality) * model.nv].reshape(-1, model.nv)[equality]
         error = np.array(data.efc_pos)[equality]
         size = float(np.abs(error).max(initial=0.0))
         if size < residual:
@@ -276,10 +276,10 @@ def places(model: mujoco.MjModel, seen: Survey) -> Places:
                 site, score = name, found
     held = held_roots(model)
     named = sorted(bodies, key=lambda b: (b in held and bool(model.body_dofnum[b] == 6), b in loops, b), reverse=True)
-    body = mujoco.mj_id2name(model, obj.mjOBJ_BODY, named[0]) if named else "world"
+    platform = str(mujoco.mj_id2name(model, obj.mjOBJ_BODY, named[0])) if named else "world"
     heavy = sorted(bodies, key=lambda b: -float(model.body_mass[b]))
     names = tuple(mujoco.mj_id2name(model, obj.mjOBJ_BODY, b) for b in heavy if model.body_mass[b] > 0)
-    return Places(site, body, tuple(initial), names, ranges, float(model.stat.extent))
+    return Places(site, platform, tuple(initial), names, ranges, float(model.stat.extent))
 
 
 SHIFTED = 1e-6
