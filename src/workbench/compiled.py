@@ -23,7 +23,7 @@ KERNEL_FILES = (
     *(f"robots/asym_2rss_ppap/{name}.py" for name in ("kernel", "friction")),
     *(f"robots/planar_4rprp/{name}.py" for name in ("kernel", "friction")),
     *(f"robots/{name}.py" for name in ("blocks", "sine_cosine")),
-    *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "structure", "tables")),
+    *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "kinds", "tables", "frames")),
 )
 """What machine code is made of. A kernel calls into other files, and its cache must not outlive a change in those."""
 

@@ -129,9 +129,9 @@ def _motion(reference: MujocoReference, where: Places) -> tuple[Motion, tuple[st
     """
     home = reference.home
     slides = np.array(reference.actuated_slides)
-    amplitude: FloatArray = np.where(slides, SLIDE * where.extent, HINGE)
+    first: FloatArray = np.where(slides, SLIDE * where.extent, HINGE)
     low, high = (np.array([where.ranges.get(j, (-np.inf, np.inf))[i] for j in reference.joint_names]) for i in (0, 1))
-    amplitude = np.asarray(np.minimum(amplitude, np.maximum((high - low) / 4.0, 1e-4)), dtype=np.float64)
+    amplitude: FloatArray = np.asarray(np.minimum(first, np.maximum((high - low) / 4.0, 1e-4)), dtype=np.float64)
     frequency: FloatArray = 3.0 + 0.5 * np.arange(len(home)) % 4.0
     t = np.linspace(0.0, STOP_S, SAMPLES)
     last: WorkbenchError | None = None

@@ -8,8 +8,10 @@ that names the sample, never a result.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
@@ -19,9 +21,7 @@ from workbench.reference.kernels import integrate, newton_step, predict
 from workbench.reference.rows import constraint_rows
 from workbench.reference.structure import Structure
 from workbench.reference.tables import tables_of
-
-CLOSED = 1e-13
-"""Largest residual of a closed loop, metres (for turns: radians)."""
+from workbench.reference.tolerance import KEY, RANK, tolerance_of
 
 CORRECTION = 0.1
 """A continuation step is accepted when Newton moves the configuration by less than this fraction of the step."""
@@ -100,21 +100,59 @@ class LoopCloser:
         self.structure = structure
         self.tables = tables_of(engine.model, structure)
         self.joints = self.tables.joints
-        home = structure.home_qpos[None, :]
+        self.tolerance = tolerance_of(engine.model, structure.home_qpos, structure.file)
+        # a step in metres counts by the robot's size, one in radians as it is
+        self._weights = _weights(engine.model, self.tolerance.size)
+        self._home = self._close_home(structure.home_qpos[None, :])
+        self.home = self._home.qpos[0]
+
+    def _close_home(self, home: FloatArray) -> Assembly:
+        """Close the pose ``(1, nq)`` from which all others are reached."""
         found = self._newton_alone(home)
-        if not found.residual[0] <= CLOSED:
+        if not found.residual[0] <= self.tolerance.closed:
             # edited lengths can put the file's home pose out of reach: move the actuated joints too, but little
             closed, residual = self._close_freely(home.copy())
-            if not residual[0] <= CLOSED:
-                raise ModelError(
-                    f"{structure.file}: the loops cannot be closed from the home pose; {self._worst_block(closed)}"
-                    f" stays open by {residual[0]:.3g} m (allowed: {CLOSED:g})",
-                    file=structure.file,
-                    value=float(residual[0]),
-                )
+            if self.tolerance.closed < residual <= self.tolerance.allowed:
+                self._close_by_digits()
+            elif not residual <= self.tolerance.closed:
+                self._refuse_home(home, closed, residual)
             found = self._newton_alone(closed)
-        self._home = found
-        self.home = found.qpos[0]
+        if not self.tolerance.few_digits and self._locked(found.qpos[0]):
+            # axes that are parallel to six digits only leave no freedom, where the robot that is meant has some
+            self._close_by_digits()
+            found = self._newton_alone(found.qpos)
+        return found
+
+    def _close_by_digits(self) -> None:
+        self.tolerance = dataclasses.replace(self.tolerance, few_digits=True)
+
+    def _locked(self, qpos: FloatArray) -> bool:
+        """Whether the loops leave fewer freedoms than there are actuators, and more of them with fewer digits."""
+        jacobian = self.jacobian(qpos)
+        if not len(jacobian):
+            return False
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        freedoms = jacobian.shape[1]
+        few = self.tolerance.allowed / self.tolerance.size
+        strict, coarse = (freedoms - int(np.count_nonzero(values > limit * values[0])) for limit in (RANK, few))
+        return bool(strict < min(coarse, len(self.structure.actuated)))
+
+    def _refuse_home(self, home: FloatArray, closed: FloatArray, residual: float) -> None:
+        """Describe the file as it is drawn, then how near the loops come to closing."""
+        structure, allowed = self.structure, self.tolerance
+        drawn = np.abs(constraint_jacobian(self.engine, structure, self.joints, home)[1])
+        worst = int(np.searchsorted(structure.block_rows, int(np.argmax(drawn)), side="right")) - 1
+        raise ModelError(
+            f"{structure.file}: the loops cannot be closed from the home pose; equality"
+            f' "{structure.block_names[worst]}" is open by {float(drawn.max()):.3g} m as drawn, and the nearest pose'
+            f" leaves {residual:.3g} m (allowed: {allowed.closed:.3g}, or {allowed.allowed:.3g} for loops that agree"
+            f' only to some digits; <text name="{KEY}"> sets the latter)',
+            file=structure.file,
+            element=structure.block_names[worst],
+            value=residual,
+            drawn=float(drawn.max()),
+            qpos=closed[0].tolist(),
+        )
 
     def jacobian(self, qpos: FloatArray) -> FloatArray:
         """Constraint Jacobian ``(m, nv)`` of one configuration ``(nq,)``."""
@@ -166,7 +204,8 @@ class LoopCloser:
         done, step = np.zeros(len(target)), np.ones(len(target))
         active = np.arange(len(target))
         while len(active):
-            speed = np.linalg.norm(np.matmul(here.tangent[active], way[active, :, None])[:, :, 0], axis=1)
+            rates = np.matmul(here.tangent[active], way[active, :, None])[:, :, 0] * self._weights[0]
+            speed = np.linalg.norm(rates, axis=1)
             with np.errstate(divide="ignore"):
                 longest = ALMOST * LONGEST_STEP / speed
             part = np.minimum(np.minimum(step[active], 1.0 - done[active]), longest)
@@ -175,9 +214,9 @@ class LoopCloser:
             moved, predicted = self._predict(here, active, way[active] * part[:, None])
             predicted[:, self.structure.actuated_qpos] = aim
             closed = self._newton(evaluator, predicted)
-            correction = np.sqrt(np.sum((closed.qpos - predicted) ** 2, axis=1))
+            correction = np.sqrt(np.sum(((closed.qpos - predicted) * self._weights[1]) ** 2, axis=1))
             small = correction <= np.maximum(CORRECTION * moved, NEGLIGIBLE)
-            accepted = (closed.residual <= CLOSED) & small & (moved <= LONGEST_STEP)
+            accepted = (closed.residual <= self.tolerance.residual) & small & (moved <= LONGEST_STEP)
             here.put(active[accepted], closed, accepted)
             done[active[accepted]] += part[accepted]
             step[active[accepted]] *= 2.0
@@ -189,24 +228,31 @@ class LoopCloser:
             active = active[done[active] < 1.0]
         return here
 
-    def _close_freely(self, qpos: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Close one configuration ``(1, nq)`` by least-norm Newton steps on all joints, the actuated ones included."""
-        structure = self.structure
-        residual = np.full(1, np.inf)
+    def _close_freely(self, qpos: FloatArray) -> tuple[FloatArray, float]:
+        """Close one configuration ``(1, nq)`` by least-norm Newton steps on all joints, the actuated ones included.
+
+        Returns the best pose met and its residual.
+        """
+        best, least = qpos.copy(), np.inf
         for _ in range(FREE_STEPS):
-            jacobian, open_by = constraint_jacobian(self.engine, structure, self.joints, qpos)
-            residual = np.abs(open_by).max(keepdims=True)
-            if residual[0] <= 0.01 * CLOSED or not np.isfinite(residual[0]):
+            jacobian, open_by = constraint_jacobian(self.engine, self.structure, self.joints, qpos)
+            residual = float(np.abs(open_by).max(initial=0.0))
+            if not np.isfinite(residual):
                 break
-            step = -np.linalg.lstsq(jacobian, open_by, rcond=1e-9)[0]
-            step *= min(1.0, LONGEST_FREE_STEP / max(float(np.linalg.norm(step)), 1e-300))
+            if residual < least:
+                best, least = qpos.copy(), residual
+            if residual <= self.tolerance.floor:
+                break
+            step = -np.linalg.lstsq(jacobian, open_by, rcond=self.tolerance.relative)[0]
+            length = float(np.linalg.norm(step * self._weights[0]))
+            step *= min(1.0, LONGEST_FREE_STEP / max(length, 1e-300))
             integrate(qpos[0], step, self.joints, qpos[0])
-        return qpos, residual
+        return best, least
 
     def _predict(self, here: Assembly, rows: np.ndarray, change: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Tangent predictor: distance moved by a change of the actuated coordinates, and where that leads."""
         moved, out = np.empty(len(rows)), np.empty((len(rows), here.qpos.shape[1]))
-        predict(here.qpos[rows], here.tangent[rows], change, self.joints, out, moved)
+        predict(here.qpos[rows], here.tangent[rows], change, self.joints, self._weights[0], out, moved)
         return moved, out
 
     def _newton(self, evaluator: Evaluator, start: FloatArray) -> Assembly:
@@ -216,7 +262,8 @@ class LoopCloser:
         qpos = evaluator.qpos
         qpos[:count] = start
         # the floor: a closed sample gets one more step, which takes it to rounding; then it stays
-        limits = (CLOSED, 0.01 * CLOSED, ASTRAY)
+        tolerance = self.tolerance
+        limits = (tolerance.residual, tolerance.floor, ASTRAY * tolerance.size, tolerance.few_digits)
         active = np.arange(count)
         for _ in range(NEWTON_STEPS):
             poses = evaluator.place(active)
@@ -251,15 +298,6 @@ class LoopCloser:
             reached=reached.tolist(),
         )
 
-    def _worst_block(self, qpos: FloatArray) -> str:
-        structure = self.structure
-        poses = self.engine.poses(qpos)
-        gaps = [
-            float(np.linalg.norm(poses.site_xpos[0, b[3]] - poses.site_xpos[0, b[4]])) if b[0] < 2 else 0.0
-            for b in structure.blocks
-        ]
-        return f'equality "{structure.block_names[int(np.argmax(gaps))]}"' if gaps else "the model"
-
 
 def constraint_jacobian(
     engine: Engine, structure: Structure, joints: tuple[np.ndarray, ...], qpos: FloatArray
@@ -269,6 +307,17 @@ def constraint_jacobian(
     jacobian, residual = np.zeros((structure.rows, poses.cdof.shape[1])), np.zeros(structure.rows)
     constraint_rows(tables.closures, tables.joints, qpos[0], *(array[0] for array in poses.tables), jacobian, residual)
     return jacobian, residual
+
+
+def _weights(model: mujoco.MjModel, size: float) -> tuple[FloatArray, FloatArray]:
+    """What a unit of each velocity ``(nv,)`` and of each coordinate ``(nq,)`` counts: lengths by the robot's size."""
+    velocities, coordinates = np.ones(model.nv), np.ones(model.nq)
+    for joint in range(model.njnt):
+        kind = mujoco.mjtJoint(model.jnt_type[joint])
+        lengths = {mujoco.mjtJoint.mjJNT_SLIDE: 1, mujoco.mjtJoint.mjJNT_FREE: 3}.get(kind, 0)
+        for array, first in ((velocities, model.jnt_dofadr[joint]), (coordinates, model.jnt_qposadr[joint])):
+            array[first : first + lengths] = 1.0 / size
+    return velocities, coordinates
 
 
 def _nearest(points: FloatArray, seeds: FloatArray) -> np.ndarray:

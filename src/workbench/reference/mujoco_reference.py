@@ -20,6 +20,7 @@ from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf.compile import custom_text
 from workbench.mjcf.setup import Setup
+from workbench.reference.body_forces import acts_on_bodies, felt_gravity
 from workbench.reference.closure import Assembly, LoopCloser
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
 from workbench.reference.freedoms import check_freedoms
@@ -27,13 +28,10 @@ from workbench.reference.kernels import projection, velocities
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
 from workbench.reference.structure import Structure, read_structure
+from workbench.reference.tolerance import rank_of
 from workbench.robots.load import LoadedModel, load_model
 
 MASS_MODELS = ("distributed", "lumped")
-
-INCONSISTENT = 1e-9
-"""A velocity residual above this fraction of the fastest constraint velocity means that the actuated motion cannot be
-followed: the pose is singular or the mechanism is actuated redundantly and inconsistently."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,8 @@ class ReferenceResult:
     xdd: FloatArray
     reactions: dict[str, FloatArray]
     """force ``(n, 3)`` in N, base frame, that the parent exerts on the child body at each joint, and that the second
-    site's body exerts on the first's at each loop closure; none where there are more actuators than freedoms"""
+    site's body exerts on the first's at each loop closure; none where there are more actuators than freedoms, and none
+    where a fluid or a spatial tendon acts on bodies"""
     closure_residual: FloatArray
     """``(n,)`` largest open loop coordinate, m (rad for turns)"""
     velocity_residual: FloatArray
@@ -62,6 +61,9 @@ class ReferenceResult:
     qpos: FloatArray
     qvel: FloatArray
     qacc: FloatArray
+    slack: FloatArray
+    """``(n, na)`` what the loops' disagreement is worth in each torque, N or N m, where a file's digits keep them from
+    closing together; zero where they close"""
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,7 @@ class MujocoReference:
         self.loaded = loaded
         self._threads = threads
         self._structure = read_structure(loaded.model, loaded.file)
-        self._engines = {"distributed": Engine(loaded.model, threads)}
+        self._engines = {"distributed": Engine(loaded.model, threads, self._structure.frames)}
         self._mass_layout = mass_layout(loaded.model)
         self._closer = LoopCloser(self._engines["distributed"], self._structure)
         tables = self._closer.tables
@@ -196,7 +198,7 @@ class MujocoReference:
         structure = self._structure
         jacobian = self._home_jacobian()
         loops = jacobian[: structure.loop_rows]
-        rank = int(np.linalg.matrix_rank(loops, tol=1e-9)) if len(loops) else 0
+        rank = rank_of(loops, self._closer.tolerance)
         freedoms = jacobian.shape[1]
         idle = len(structure.idle)
         return Mobility(freedoms - rank - idle, freedoms, structure.loop_rows, rank, structure.loop_rows - rank, idle)
@@ -249,27 +251,36 @@ class MujocoReference:
         velocities(assembly.tangent, qd, qvel)
         site = structure.platform_site
         platform = int(model.site_bodyid[site]), site
-        masses, gravity = np.array(model.body_mass), np.array(model.opt.gravity)
+        masses, gravity = np.array(model.body_mass), felt_gravity(model)
+        few_digits = self._closer.tolerance.few_digits
+        slack = np.zeros((n if few_digits else 0, len(structure.actuated)))
+        friction = structure.friction
 
         def block(evaluator: Evaluator, rows: slice) -> None:
             poses, dynamics = evaluator.move(qpos[rows], qvel[rows])
+            if friction.inside:
+                passive = dynamics.passive[: rows.stop - rows.start] + friction.force(qvel[rows])
+                passive.flags.writeable = False
+                dynamics = dataclasses.replace(dynamics, passive=passive)
             projection(
                 *self._tables, poses.tables, dynamics.tables, self._mass_layout, platform, masses, gravity,
                 self._base_rotation, self._base_position, qpos[rows], qvel[rows], assembly.tangent[rows], qdd[rows],
                 force[rows], qacc[rows], tau[rows], velocity_residual[rows], acceleration_residual[rows],
-                motion[:, rows], reactions[:, rows],
+                motion[:, rows], reactions[:, rows], slack[rows],
             )  # fmt: skip
             energy[rows] = dynamics.energy[: rows.stop - rows.start]
 
         engine.in_blocks(block, n)
         self._refuse_singular(q, qd, assembly.rank, velocity_residual, assembly.weakest)
         # in MuJoCo dry friction is a constraint, so neither bias nor passive forces hold it
-        tau += model.dof_frictionloss[structure.actuated] * direction(qd)
+        tau += friction.actuated * direction(qd)
+        known = {} if acts_on_bodies(model) else named(self._reaction_rows, reactions)
         return ReferenceResult(
-            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], reactions=named(self._reaction_rows, reactions),
+            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], reactions=known,
             closure_residual=assembly.residual.copy(), velocity_residual=velocity_residual,
             acceleration_residual=acceleration_residual, rank=assembly.rank.copy(),
             condition=assembly.condition.copy(), energy=energy, qpos=qpos.copy(), qvel=qvel, qacc=qacc,
+            slack=slack if few_digits else np.zeros_like(tau),
         )  # fmt: skip
 
     def _no_samples(self, mass_model: str) -> ReferenceResult:
@@ -302,7 +313,9 @@ class MujocoReference:
                         file=self.file,
                     )
             self._engines[mass_model] = Engine(
-                without_bar_inertia(self.spec(), tuple(names.split()), self.file), self._threads
+                without_bar_inertia(self.spec(), tuple(names.split()), self.file),
+                self._threads,
+                self._structure.frames,
             )
         return self._engines[mass_model]
 
@@ -330,15 +343,16 @@ class MujocoReference:
     def _check_freedoms(self) -> None:
         """Every passive freedom must follow from the actuated ones; there may be more actuators than needed."""
         structure, home = self._structure, self._home_jacobian()
-        check_freedoms(structure, home, self._closer.jacobian_near_home)
+        tolerance = self._closer.tolerance
+        check_freedoms(structure, home, self._closer.jacobian_near_home, tolerance.relative)
         if not self.mobility().mobility:
             raise ModelError(
                 f"{self.file}: the loops leave no freedom, so that {', '.join(structure.joint_names)} cannot move;"
                 " take an equality out, or add a joint",
                 file=self.file,
             )
-        if excess_actuators(home, structure.passive, structure.actuated):
-            columns, tables = leading(structure, home)
+        if excess_actuators(home, structure.passive, structure.actuated, tolerance.relative):
+            columns, tables = leading(structure, home, tolerance.relative)
             self._leader = self._led_by(dataclasses.replace(tables, home_qpos=self._closer.home)), columns
 
     def _led_by(self, structure: Structure) -> MujocoReference:
@@ -355,7 +369,7 @@ class MujocoReference:
     ) -> None:
         structure = self._structure
         speed = np.maximum(np.abs(qd).max(axis=1), 1.0)
-        bad = (rank < len(structure.passive)) | ~(residual <= INCONSISTENT * speed)
+        bad = (rank < len(structure.passive)) | ~(residual <= self._closer.tolerance.velocity * speed)
         if bad.any():
             sample = int(np.argmax(bad))
             joint = structure.dof_names[int(weakest[sample])]

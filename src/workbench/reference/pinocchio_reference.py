@@ -17,9 +17,11 @@ from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf.compile import custom_text
 from workbench.mjcf.setup import Setup
+from workbench.reference.kinds import CONNECT, SPIN, WELD
+from workbench.reference.pinocchio_limits import refuse_uncounted
 from workbench.reference.pinocchio_loops import PinocchioLoops
 from workbench.reference.pinocchio_reader import import_pinocchio, read, without_inertia
-from workbench.reference.structure import CONNECT, SPIN, WELD, read_structure
+from workbench.reference.structure import read_structure
 from workbench.robots.load import LoadedModel, load_model
 
 MASS_MODELS = ("distributed", "lumped")
@@ -80,9 +82,12 @@ class PinocchioReference:
         self._compiled = loaded.model
         structure = self._structure = read_structure(loaded.model, loaded.file)
         sites = {structure.platform_site}
+        refuse_uncounted(loaded.model, structure)
         for kind, _, _, one, two in structure.blocks.tolist():
-            sites |= {one, two} if kind in (CONNECT, WELD) else {one} if kind == SPIN else set()
-        self._reading = read(self._pin, _flat(loaded), loaded.model, sites, loaded.file)
+            sites |= {
+                point for point in (one, two) if kind in (CONNECT, WELD, SPIN) and 0 <= point < loaded.model.nsite
+            }
+        self._reading = read(self._pin, _flat(loaded), loaded.model, sites, loaded.file, structure.frames)
         self._loops = PinocchioLoops(self._pin, self._reading, structure, loaded.model)
         self._models: dict[str, Any] = {"distributed": self._reading.model}
 

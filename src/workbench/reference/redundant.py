@@ -29,10 +29,10 @@ CONSISTENT = 1e-9
 """rad or m, and times the speed: how far an excess actuator may be from where the others put it."""
 
 
-def left_null_space(matrix: FloatArray) -> FloatArray:
+def left_null_space(matrix: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
     """Orthonormal basis ``(m, k)`` of all y with ``y^T matrix = 0``."""
     u, values, _ = np.linalg.svd(matrix, full_matrices=True)
-    rank = int(np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0)))
+    rank = int(np.count_nonzero(values > tolerance * values.max(initial=0.0)))
     basis: FloatArray = u[:, rank:]
     return basis
 
@@ -43,15 +43,16 @@ def self_stress(jacobian: FloatArray, passive: np.ndarray, actuated: np.ndarray)
     return free, jacobian[:, actuated].T @ free
 
 
-def excess_actuators(jacobian: FloatArray, passive: np.ndarray, actuated: np.ndarray) -> int:
+def excess_actuators(jacobian: FloatArray, passive: np.ndarray, actuated: np.ndarray, tolerance: float = 1e-9) -> int:
     """Number of actuators beyond the freedoms: how many independent torques strain the mechanism against itself."""
     if not len(jacobian):
         return 0
     scale = max(float(np.abs(jacobian).max()), 1e-300)
-    return int(np.linalg.matrix_rank(self_stress(jacobian, passive, actuated)[1], tol=1e-9 * scale))
+    free = left_null_space(jacobian[:, passive], max(RANK_TOLERANCE, 0.1 * tolerance))
+    return int(np.linalg.matrix_rank(jacobian[:, actuated].T @ free, tol=tolerance * scale))
 
 
-def leading(structure: Structure, jacobian: FloatArray) -> tuple[np.ndarray, Structure]:
+def leading(structure: Structure, jacobian: FloatArray, tolerance: float = 1e-9) -> tuple[np.ndarray, Structure]:
     """Choose as many actuators as there are freedoms, those that determine the rest best.
 
     Parameters
@@ -66,7 +67,7 @@ def leading(structure: Structure, jacobian: FloatArray) -> tuple[np.ndarray, Str
     numpy.ndarray, Structure
         Their places among the actuated joints, and the tables in which the other actuated joints are passive.
     """
-    rank = np.linalg.matrix_rank(jacobian, tol=1e-9 * float(np.abs(jacobian).max()))
+    rank = np.linalg.matrix_rank(jacobian, tol=tolerance * float(np.abs(jacobian).max()))
     motions = np.linalg.svd(jacobian, full_matrices=True)[2][rank:]
     order = qr(motions[:, structure.actuated], pivoting=True, mode="r")[1]
     chosen = np.sort(order[: len(motions)])
@@ -78,6 +79,7 @@ def leading(structure: Structure, jacobian: FloatArray) -> tuple[np.ndarray, Str
         structure,
         actuated=actuated,
         actuated_qpos=structure.actuated_qpos[chosen],
+        friction=dataclasses.replace(structure.friction, actuated=structure.friction.actuated[chosen]),
         passive=passive,
         joint_names=tuple(structure.joint_names[i] for i in chosen),
         columns=columns,
@@ -120,7 +122,7 @@ def shared(
     """Inverse dynamics of excess actuators: the leading ones give motion and power, all of them share the load.
 
     With A = dqd/dqd_lead, torques that do the same work fulfil ``A^T tau = tau_lead``; those of least norm are
-    ``pinv(A^T) tau_lead``.
+    ``pinv(A^T) tau_lead``. Dry friction of an excess actuator's joint is its own business, as that of a leading one is.
     Reactions depend on how the load is shared; they are left out.
 
     Raises
@@ -135,8 +137,9 @@ def shared(
     refuse_inconsistent("qd", qd, found.qvel[:, structure.actuated], names, CONSISTENT * speed)
     rise = speed**2 + np.abs(qdd).max(axis=1, keepdims=True)
     refuse_inconsistent("qdd", qdd, found.qacc[:, structure.actuated], names, CONSISTENT * rise)
-    dry = leader.compiled(mass_model).dof_frictionloss[structure.actuated] * direction(qd)
+    dry = structure.friction.actuated * direction(qd)
     per_lead = leader.tangent(q[:, columns])[:, structure.actuated]
     work = found.tau - dry[:, columns]
     tau = np.matmul(np.linalg.pinv(per_lead.transpose(0, 2, 1)), work[:, :, None])[:, :, 0] + dry
-    return dataclasses.replace(found, tau=tau, reactions={})
+    slack = np.matmul(np.abs(np.linalg.pinv(per_lead.transpose(0, 2, 1))), found.slack[:, :, None])[:, :, 0]
+    return dataclasses.replace(found, tau=tau, reactions={}, slack=slack)

@@ -45,7 +45,8 @@ def home_pose(path: Path) -> Poses:
     """
     loaded = open_model(path)
     try:
-        qpos = LoopCloser(Engine(loaded.model), read_structure(loaded.model, loaded.file)).home
+        structure = read_structure(loaded.model, loaded.file)
+        qpos = LoopCloser(Engine(loaded.model, frames=structure.frames), structure).home
     except WorkbenchError:
         model = loaded.model
         home = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, "home")
