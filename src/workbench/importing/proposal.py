@@ -129,17 +129,18 @@ def _motion(reference: MujocoReference, where: Places) -> tuple[Motion, tuple[st
     """
     home = reference.home
     slides = np.array(reference.actuated_slides)
-    first: FloatArray = np.where(slides, SLIDE * where.extent, HINGE)
-    low, high = (np.array([where.ranges.get(j, (-np.inf, np.inf))[i] for j in reference.joint_names]) for i in (0, 1))
-    amplitude: FloatArray = np.asarray(np.minimum(first, np.maximum((high - low) / 4.0, 1e-4)), dtype=np.float64)
-    frequency: FloatArray = 3.0 + 0.5 * np.arange(len(home)) % 4.0
+    first: FloatArray = np.where(slides, SLIDE * where.extent, HINGE).astype(np.float64)
+    ranges = np.array([where.ranges.get(joint, (-np.inf, np.inf)) for joint in reference.joint_names], dtype=np.float64)
+    low, high = ranges.T
+    amplitude: FloatArray = np.minimum(first, np.maximum((high - low) / 4.0, 1e-4))
+    frequency: FloatArray = 3.0 + 0.5 * np.arange(len(home), dtype=np.float64) % 4.0
     t = np.linspace(0.0, STOP_S, SAMPLES)
     last: WorkbenchError | None = None
     kept: tuple[Motion, tuple[str, ...], tuple[str, ...]] | None = None
     for halving in range(HALVINGS):
         part: FloatArray = amplitude * 0.5**halving
         offset = np.clip(home, low + 1.01 * part, high - 1.01 * part) if np.all(low + 2.1 * part <= high) else home
-        q, qd, qdd = _sine(t, offset, part, frequency)
+        q, qd, qdd = sine(t, offset, part, frequency)
         try:
             result = reference.inverse_dynamics(q, qd, qdd)
         except MotionError as error:
@@ -159,9 +160,10 @@ def _motion(reference: MujocoReference, where: Places) -> tuple[Motion, tuple[st
     return kept
 
 
-def _sine(
+def sine(
     t: FloatArray, offset: FloatArray, amplitude: FloatArray, frequency: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """q, qd, qdd ``(n, na)`` at times ``(n,)``."""
     phase = t[:, None] * frequency
     return (
         offset + amplitude * np.sin(phase),

@@ -13,9 +13,10 @@ import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.errors import ModelError
+from workbench.errors import ModelError, did_you_mean
 
 SLIDES = ("x", "y", "z")
+SIX = 6
 FREE = mujoco.mjtJoint.mjJNT_FREE
 
 
@@ -91,33 +92,46 @@ def free_joints(model: mujoco.MjModel, file: str, fix_base: str, rest: bool) -> 
     model, file
         The user's compiled model and its name.
     fix_base
-        Body whose free joint is taken out although a robot hangs on it.
+        Top-level body whose joints, free or not, are taken out: a robot hangs on it.
     rest
         Take out those of all bodies that no loop holds.
 
     Raises
     ------
     ModelError
-        *fix_base* names a body without a free joint, or one that loops hold.
+        *fix_base* names a body that does not float.
     """
     held = held_roots(model)
     fixed, split = [], []
+    base = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, fix_base)) if fix_base else -1
     for joint in range(model.njnt):
-        if mujoco.mjtJoint(model.jnt_type[joint]) != FREE:
-            continue
-        body = int(model.jnt_bodyid[joint])
-        chosen = bool(fix_base) and mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, fix_base) == body
-        if chosen or (rest and body not in held):
+        body, free = int(model.jnt_bodyid[joint]), mujoco.mjtJoint(model.jnt_type[joint]) == FREE
+        if body == base or (free and rest and body not in held):
             fixed.append(joint)
-        elif body in held:
+        elif free and body in held:
             split.append(_split(model, joint, body))
-    if fix_base and not any(int(model.jnt_bodyid[j]) == _body(model, fix_base) for j in fixed):
-        raise ModelError(f'{file}: fix_base = "{fix_base}": this body has no free joint', file=file)
+    if fix_base and (model.body_parentid[base] or not model.body_jntnum[base]):
+        floating = [name for name in floating_bases(model) if name]
+        raise ModelError(
+            f'{file}: fix_base = "{fix_base}": is no body that floats{did_you_mean(fix_base, floating)}', file=file
+        )
     return FreeJoints(tuple(fixed), tuple(split))
 
 
-def _body(model: mujoco.MjModel, name: str) -> int:
-    return int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name))
+def floating_bases(model: mujoco.MjModel) -> list[str]:
+    """Names of top-level bodies with six freedoms of their own: a free joint, or slides and hinges or a ball."""
+    driven = {
+        int(model.actuator_trnid[actuator, 0])
+        for actuator in range(model.nu)
+        if model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT
+    }
+    found = []
+    for body in range(1, model.nbody):
+        first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+        own = set(range(first, first + count))
+        if model.body_parentid[body] == 0 and model.body_dofnum[body] == SIX and not own & driven:
+            found.append(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body) or "")
+    return found
 
 
 def held_roots(model: mujoco.MjModel) -> set[int]:

@@ -99,9 +99,9 @@ def _moved(user: mujoco.MjModel, preparation: Preparation) -> list[str]:
         notes.append(f"joint {names[joint]}: rotor inertia of its actuator counts, {more:g} with gear squared")
     for joint, losses in preparation.damping:
         notes.append(f"joint {names[joint]}: damping of its actuator counts, {losses[0]:g} with gear squared")
-    for joint in preparation.free.fixed:
-        body = mujoco.mj_id2name(user, mujoco.mjtObj.mjOBJ_BODY, int(user.jnt_bodyid[joint]))
-        notes.append(f'body "{body}" stands still where it is drawn: its free joint is left out')
+    for body in dict.fromkeys(int(user.jnt_bodyid[joint]) for joint in preparation.free.fixed):
+        name = mujoco.mj_id2name(user, mujoco.mjtObj.mjOBJ_BODY, body) or f"#{body}"
+        notes.append(f'body "{name}" stands still where it is drawn: its own joints are left out')
     return notes + [
         f"joint {names[split.joint]}: loops hold its body; it counts as {', '.join(split.names)}"
         for split in preparation.free.split

@@ -130,11 +130,11 @@ class _Reader:
                 raise ModelError(f"{where}: files inside files, deeper than {DEEPEST}", file=file)
             included.add(path)
             self.files.append(path)
-            found = scan(inner, str(path))
+            found = scan(inner, str(path), included=True)
             self._count(len(found), where)
             if any(other.tag == "include" for other in found):
                 inner = self._expanded(inner, found, str(path), folder, path.parent, (*stack, path), included)
-                found = scan(inner, str(path))
+                found = scan(inner, str(path), included=True)
             content = inner[found[0].end : found[0].close]
             pieces += [text[last : element.start], " ".join(content.splitlines())]
             last = element.stop

@@ -55,8 +55,8 @@ class Edit:
     """its text, where the shortest one does not do"""
 
 
-def scan(text: str, file: str) -> list[Element]:
-    """List the start tags of an MJCF text.
+def scan(text: str, file: str, included: bool = False) -> list[Element]:
+    """List the start tags of an MJCF text; of one that is *included*, the root may have any name.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def scan(text: str, file: str) -> list[Element]:
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
         line = parser.CurrentLineNumber
-        refuse_element(tag, attributes, len(path), len(found), f"{file}:{line}")
+        refuse_element("mujoco" if included and not path else tag, attributes, len(path), len(found), f"{file}:{line}")
         name = attributes.get("name", "")
         path.append((tag, len(found)))
         if tag == "body":

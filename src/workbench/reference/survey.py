@@ -14,7 +14,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.mjcf.compile import engine_warnings
-from workbench.mjcf.free_joints import held_roots
+from workbench.mjcf.free_joints import floating_bases, held_roots
 
 STEPS = 100
 CLOSED = 1e-12
@@ -134,19 +134,21 @@ def _standing(model: mujoco.MjModel) -> tuple[str, tuple[str, ...], np.ndarray]:
     held, loops = held_roots(model), _loop_bodies(model)
     driven = {int(model.jnt_bodyid[j]) for j in _driven(model)}
     base, loose, still = "", [], []
-    for joint in range(model.njnt):
-        if mujoco.mjtJoint(model.jnt_type[joint]) != FREE:
-            continue
-        body = int(model.jnt_bodyid[joint])
-        if body in held:
-            continue
+    floating = floating_bases(model)
+    for body in range(1, model.nbody):
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body) or ""
+        joint = int(model.body_jntadr[body])
+        free = joint >= 0 and mujoco.mjtJoint(model.jnt_type[joint]) == FREE
+        if body in held or not (free or (name and name in floating)):
+            continue
         inside = {b for b in range(model.nbody) if model.body_rootid[b] == body}
         if not base and name and inside & (loops | driven):
             base = name
-        else:
+        elif free:
             loose.append(name or f"#{body}")
-        still += list(range(int(model.jnt_dofadr[joint]), int(model.jnt_dofadr[joint]) + 6))
+        else:
+            continue
+        still += list(range(int(model.body_dofadr[body]), int(model.body_dofadr[body]) + 6))
     return base, tuple(loose), np.array(still, dtype=np.int64)
 
 
