@@ -36,7 +36,7 @@ def features(text: str, model: mujoco.MjModel) -> str:
 
 
 def compare(found: Proposal, path: Path) -> tuple[float, float, float]:
-    """Largest error of a joint's torque over its peak, spins of rods at rest and free, and how far the loops are open."""
+    """Largest error of a joint's torque over its peak, spins of rods at rest and free; how far the loops are open."""
     assert found.motion is not None
     motion, t = found.motion, np.linspace(0.0, STOP_S, SAMPLES)
     q, qd, qdd = sine(t, *(np.array(part) for part in (motion.offset, motion.amplitude, motion.frequency)))

@@ -19,7 +19,6 @@ from workbench.errors import MotionError, ParameterError
 from workbench.mjcf.quantities import read_quantities
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
-from workbench.reference.structure import SPIN
 from workbench.robots.base import Mechanism, Reach
 from workbench.robots.kernel_call import TorqueKernel
 from workbench.robots.parameters import ParameterInfo
@@ -145,13 +144,15 @@ class GenericMechanism(Mechanism):
                 " them, and reactions are left out"
             )
         structure, model = self.reference.structure, self.reference.compiled()
-        spinning = structure.blocks[structure.blocks[:, 0] == SPIN, 1]
-        for name, body in zip(structure.idle, spinning, strict=True):
-            dofs = slice(model.body_dofadr[body], model.body_dofadr[body] + 3)
-            if model.dof_damping[dofs].any() or model.dof_armature[dofs].any():
+        found += self.reference.notes
+        for name, rod in zip(structure.idle, structure.rods, strict=True):
+            joints = [-1 - end for end in (rod.near, rod.far) if end < 0]
+            dofs = [d for j in joints for d in range(model.jnt_dofadr[j], model.jnt_dofadr[j] + 3)]
+            felt = (model.dof_damping, model.dof_armature, model.dof_frictionloss)
+            if any(values[dofs].any() for values in felt) or model.jnt_stiffness[joints].any():
                 found.append(
-                    f"rod {name}: damping or armature of its ball joint would spin it about its own axis; the reference"
-                    " holds that spin at zero, by a moment that no actuator gives"
+                    f"rod {name}: damping, dry friction, stiffness or armature of its ball joint would spin it about"
+                    " its own axis; the reference holds that spin at zero, by a moment that no actuator gives"
                 )
         return found
 

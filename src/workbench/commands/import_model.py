@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from workbench.errors import ModelError, SpecError
+
+if TYPE_CHECKING:
+    from workbench.importing.proposal import Proposal
+
+NAME_OF_FILE = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
 
 
 def names_of(given: tuple[str, ...]) -> tuple[str, ...]:
@@ -39,3 +46,73 @@ def import_model(source: Path, directory: Path, actuated: tuple[str, ...]) -> No
         out.print(Text(f"note: {note}"), soft_wrap=True)
     out.print(Text(f"{directory}: {found.model.name}, {campaign.name}; now"), soft_wrap=True)
     out.print(Text(f"  workbench run {campaign}"), soft_wrap=True)
+
+
+def print_proposal(path: Path, actuated: tuple[str, ...], everything: bool, json: bool) -> int:
+    """Print what was understood of a file, all that is refused, and a campaign to copy; returns the exit code."""
+    import dataclasses
+
+    from rich.table import Table
+    from rich.text import Text
+
+    from workbench.commands.model_tables import print_json
+    from workbench.console import out
+    from workbench.importing.proposal import propose
+    from workbench.importing.write import campaign_text
+
+    found = propose(path, actuated)
+    if json:
+        print_json(
+            {
+                "file": str(path),
+                "survey": dataclasses.asdict(found.survey) | {"qpos": found.survey.qpos.tolist()},
+                "setup": dataclasses.asdict(found.setup),
+                "notes": [*found.notes, *found.prepared.notes],
+                "problem": found.problem,
+                "refusals": [dataclasses.asdict(refusal) for refusal in found.refusals],
+            }
+        )
+        return 1 if found.problem else 0
+    out.print(Text(f"{path}: no closed form named", style="bold"), soft_wrap=True)
+    facts = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
+    facts.add_column(no_wrap=True)
+    facts.add_column()
+    for name, value in understood(found, everything):
+        facts.add_row(Text(name), Text(value))
+    out.print(facts)
+    for note in (*found.notes, *found.prepared.notes, *found.left_out):
+        out.print(Text(f"note: {note}"), soft_wrap=True)
+    for refusal in found.refusals:
+        out.print(Text(f"refused: {refusal.message}; {refusal.way}", style="red"), soft_wrap=True)
+    if found.problem:
+        if not found.refusals:
+            out.print(Text(f"refused: {found.problem}", style="red"), soft_wrap=True)
+        out.print(Text("With these mended or left out, this campaign would begin:", style="bold"), soft_wrap=True)
+    else:
+        out.print(Text("OK: it runs with this campaign:", style="bold green"), soft_wrap=True)
+    name = path.stem if NAME_OF_FILE.fullmatch(path.stem) else "robot"
+    out.print(Text(campaign_text(found, name, path.name)), soft_wrap=True, end="")
+    return 1 if found.problem else 0
+
+
+def understood(found: Proposal, everything: bool) -> list[tuple[str, str]]:
+    """The facts of a file, one line each."""
+    seen = found.survey
+    spins = f"; {seen.undriven} of them no joint can drive (spins of rods)" if seen.undriven else ""
+    freedoms = seen.mobility + seen.rank
+    facts = [
+        ("bodies, joints, loops", f"{seen.bodies}, {seen.joints}, {seen.loops}"),
+        ("mobility by rank", f"{seen.mobility} = {freedoms} joint freedoms - rank {seen.rank} of {seen.rows}{spins}"),
+        ("loops", f"open by {seen.residual:.2g} after closing from the file's own pose"),
+        ("driven", ", ".join(found.setup.actuated) or "nothing"),
+        ("platform", found.setup.platform_site or f"body {found.setup.platform_body}"),
+    ]
+    if found.motion and everything:
+        facts += [
+            (f"motion of {joint}", f"{offset:.6g} +- {amplitude:.3g}")
+            for joint, offset, amplitude in zip(
+                found.setup.actuated, found.motion.offset, found.motion.amplitude, strict=True
+            )
+        ]
+        facts += [("parameter", f"{name}: {place}") for name, place in found.parameters]
+    return facts

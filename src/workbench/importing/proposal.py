@@ -14,6 +14,7 @@ from workbench.errors import MotionError, WorkbenchError
 from workbench.mjcf.compile import find_model
 from workbench.mjcf.files import read_text
 from workbench.mjcf.prepared import Prepared, open_source
+from workbench.mjcf.refusal import Refusal
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
 from workbench.reference.left_out import look
@@ -53,6 +54,10 @@ class Proposal:
     """why it is as it is, one line each"""
     problem: str = ""
     """why no motion was found, one line"""
+    refusals: tuple[Refusal, ...] = ()
+    """each thing in the file for which no torque can be given, with its line"""
+    left_out: tuple[str, ...] = ()
+    """what the motion was held against"""
 
 
 def propose(path: str | Path, actuated: tuple[str, ...] = ()) -> Proposal:
@@ -89,11 +94,14 @@ def propose(path: str | Path, actuated: tuple[str, ...] = ()) -> Proposal:
         if not seen.actuated:
             raise MotionError(f"{path}: no hinge or slide with a name is there to be driven; say --actuated")
         reference = MujocoReference(path, setup=setup)
-        motion, ignored, said = _motion(reference, where)
+        motion, ignored, said, left = _motion(reference, where)
     except WorkbenchError as error:
-        return Proposal(found, setup, parameters, None, seen, prepared, tuple(notes), str(error))
+        return Proposal(
+            found, setup, parameters, None, seen, prepared, tuple(notes), str(error), error.facts.get("refusals", ())
+        )
     setup = dataclasses.replace(setup, ignore=(*ignore, *ignored))
-    return Proposal(found, setup, parameters, motion, seen, prepared, (*notes, *said))
+    prepared = reference.loaded.prepared or prepared
+    return Proposal(found, setup, parameters, motion, seen, prepared, (*notes, *said), left_out=left)
 
 
 def _notes(seen: Survey) -> list[str]:
@@ -119,7 +127,11 @@ def _parameters(where: Places) -> tuple[tuple[str, str], ...]:
     return (*found.items(), ("g", "gravity"))
 
 
-def _motion(reference: MujocoReference, where: Places) -> tuple[Motion, tuple[str, ...], tuple[str, ...]]:
+Tried = tuple[Motion, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
+"""A motion, what of `ignore` it needs, why, and what it was held against."""
+
+
+def _motion(reference: MujocoReference, where: Places) -> Tried:
     """The largest of ever smaller motions that the reference follows inside limits and without new contacts.
 
     Raises
@@ -136,7 +148,7 @@ def _motion(reference: MujocoReference, where: Places) -> tuple[Motion, tuple[st
     frequency: FloatArray = 3.0 + 0.5 * np.arange(len(home), dtype=np.float64) % 4.0
     t = np.linspace(0.0, STOP_S, SAMPLES)
     last: WorkbenchError | None = None
-    kept: tuple[Motion, tuple[str, ...], tuple[str, ...]] | None = None
+    kept: Tried | None = None
     for halving in range(HALVINGS):
         part: FloatArray = amplitude * 0.5**halving
         offset = np.clip(home, low + 1.01 * part, high - 1.01 * part) if np.all(low + 2.1 * part <= high) else home
@@ -146,14 +158,15 @@ def _motion(reference: MujocoReference, where: Places) -> tuple[Motion, tuple[st
         except MotionError as error:
             last = error
             continue
-        met = tuple(dict.fromkeys(crossing.what for crossing in look(reference, result).crossings))
+        seen = look(reference, result)
+        met = tuple(dict.fromkeys(crossing.what for crossing in seen.crossings))
         one = Motion(_digits(offset), _digits(part), _digits(frequency))
         if not met:
-            return one, (), ()
+            return one, (), (), seen.notes
         said = f"even a small motion meets {' and '.join(met)} that the file has, so they are ignored"
-        kept = kept or (one, met, (said,))
+        kept = kept or (one, met, (said,), seen.notes)
         if kept and len(met) < len(kept[1]):
-            kept = one, met, (said,)
+            kept = one, met, (said,), seen.notes
     if kept is None:
         assert last is not None
         raise last

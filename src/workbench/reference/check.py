@@ -14,7 +14,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError, WorkbenchError
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.compile import custom_text, engine_warnings
 from workbench.mjcf.setup import Setup
 from workbench.reference.closure import LoopCloser, constraint_jacobian
 from workbench.reference.engine import Engine
@@ -150,6 +150,18 @@ def check_model(path: str | Path, ranges: bool = True, setup: Setup | None = Non
         warnings=tuple(dict.fromkeys(warnings)),
         problems=tuple(problems),
     )
+
+
+def names_itself(path: str | Path) -> bool:
+    """Whether a file says which closed form it is, or at least what its platform is.
+
+    Raises
+    ------
+    ModelError
+        As `check_model`.
+    """
+    loaded = open_model(path)
+    return loaded.kind is not None or custom_text(loaded.model, "platform_site") is not None
 
 
 def _name(loaded: LoadedModel) -> str | None:

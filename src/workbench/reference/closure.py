@@ -154,6 +154,11 @@ class LoopCloser:
             qpos=closed[0].tolist(),
         )
 
+    @property
+    def at_home(self) -> Assembly:
+        """The pose from which all others are reached, and what is known of it."""
+        return self._home
+
     def jacobian(self, qpos: FloatArray) -> FloatArray:
         """Constraint Jacobian ``(m, nv)`` of one configuration ``(nq,)``."""
         return constraint_jacobian(self.engine, self.structure, self.joints, qpos[None, :])[0]

@@ -19,6 +19,7 @@ from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf.compile import custom_text
+from workbench.mjcf.lines import with_lines
 from workbench.mjcf.setup import Setup
 from workbench.reference.body_forces import acts_on_bodies, felt_gravity
 from workbench.reference.closure import Assembly, LoopCloser
@@ -117,7 +118,10 @@ class MujocoReference:
         self.file = loaded.file
         self.loaded = loaded
         self._threads = threads
-        self._structure = read_structure(loaded.model, loaded.file)
+        try:
+            self._structure = read_structure(loaded.model, loaded.file)
+        except ModelError as error:
+            raise (with_lines(error, loaded.prepared.source) if loaded.prepared else error) from None
         self._engines = {"distributed": Engine(loaded.model, threads, self._structure.frames)}
         self._mass_layout = mass_layout(loaded.model)
         self._closer = LoopCloser(self._engines["distributed"], self._structure)
@@ -192,6 +196,28 @@ class MujocoReference:
             The file does not say which bars lose their inertia in the lumped model.
         """
         return self._engine(mass_model).model
+
+    def with_model(self, model: mujoco.MjModel) -> MujocoReference:
+        """The same mechanism with other masses: *model* differs from the compiled one in nothing else."""
+        other = copy.copy(self)
+        other._engines = {"distributed": Engine(model, self._threads, self._structure.frames)}
+        if self._leader:
+            other._leader = self._leader[0].with_model(model), self._leader[1]
+        return other
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the results should know of the model, one line each."""
+        found = self._structure.notes
+        if self._closer.tolerance.few_digits:
+            found += (
+                "loops that agree only to some digits: they are closed by least squares, open by"
+                f" {float(self._closer.at_home.residual[0]):.2g} m at home; what that is worth in torque is in the"
+                " error budget",
+            )
+        if self._structure.friction.passive.any():
+            found += ("dry friction of a passive joint that rests counts as zero, the middle of what it may be",)
+        return found
 
     def mobility(self) -> Mobility:
         """Count freedoms and redundant rows by rank at the home pose."""

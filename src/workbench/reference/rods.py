@@ -150,6 +150,48 @@ class RodFrame:
         """Compare the rod with a body of revolution."""
         if not self.length:
             return Unevenness(0.0, 0.0, 0.0, 0.0)
+        centre, inertia = self._inertia()
+        turn = self._axes()
+        seen = turn @ inertia @ turn.T
+        uneven = max(abs(seen[0, 1]), abs(seen[0, 2]), abs(seen[1, 2]), abs(seen[1, 1] - seen[2, 2]))
+        return Unevenness(self.length, self._off(centre), float(uneven), float(np.trace(inertia)))
+
+    def rounded(self) -> tuple[FloatArray, FloatArray]:
+        """Mass centre ``(3,)`` and inertia ``(3, 3)`` about it that make the rod round.
+
+        They are the first body's, in its own frame; mass, mass centre along the axis, inertia along and mean inertia
+        across the axis stay those of the rod.
+        """
+        model, first = self._model, self.group[0]
+        centre, inertia = self._inertia()
+        turn = self._axes()
+        seen = turn @ inertia @ turn.T
+        across = 0.5 * (seen[1, 1] + seen[2, 2])
+        wanted = turn.T @ np.diag([seen[0, 0], across, across]) @ turn
+        axis = turn[0]
+        on_axis = self.near + axis * (axis @ (centre - self.near))
+        mass = float(model.body_mass[first])
+        whole = sum(float(model.body_mass[body]) for body in self.group)
+        place = np.array(model.body_ipos[first])
+        if mass:
+            place = place + (on_axis - centre) * whole / mass
+        # what the other bodies bring about the new centre is taken off
+        for body in self.group:
+            rotation, origin = self._poses[body]
+            at = place if body == first else origin + rotation @ model.body_ipos[body]
+            arm = at - on_axis
+            wanted -= model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+            if body != first:
+                wanted -= rotation @ inertia_matrix(model, body) @ rotation.T
+        return place, wanted
+
+    def _axes(self) -> FloatArray:
+        """Rows: the rod's axis and two directions across it."""
+        axis = (self.far - self.near) / self.length
+        return np.vstack([axis, np.linalg.svd(axis[None, :])[2][1:]])
+
+    def _inertia(self) -> tuple[FloatArray, FloatArray]:
+        """Mass centre of all the rod's bodies, and their inertia about it."""
         model = self._model
         mass = sum(float(model.body_mass[body]) for body in self.group)
         places = {body: place + turn @ model.body_ipos[body] for body, (turn, place) in self._poses.items()}
@@ -161,11 +203,7 @@ class RodFrame:
             turn, arm = self._poses[body][0], places[body] - centre
             inertia += turn @ inertia_matrix(model, body) @ turn.T
             inertia += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-        axis = (self.far - self.near) / self.length
-        across = np.linalg.svd(axis[None, :])[2][1:]
-        seen = np.vstack([axis, across]) @ inertia @ np.vstack([axis, across]).T
-        uneven = max(abs(seen[0, 1]), abs(seen[0, 2]), abs(seen[1, 2]), abs(seen[1, 1] - seen[2, 2]))
-        return Unevenness(self.length, self._off(centre), float(uneven), float(np.trace(inertia)))
+        return centre, inertia
 
     def _off(self, point: FloatArray) -> float:
         return float(np.linalg.norm(np.cross((self.far - self.near) / self.length, point - self.near)))

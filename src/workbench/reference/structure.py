@@ -221,8 +221,8 @@ def _judged(model: mujoco.MjModel, closures: Closures, site: int) -> list[tuple[
     for rod in rods:
         shape = RodFrame(model, rod, frames)
         uneven = shape.unevenness()
-        refusal = refuse_rod(model, rod, uneven) or _off_axis(model, rod, shape, site)
         name = name_of(model, mujoco.mjtObj.mjOBJ_BODY, rod.body)
+        refusal = refuse_rod(model, rod, uneven) or _off_axis(model, rod, shape, site) or _in_fluid(model, name)
         note = (
             f"rod {name}: no body of revolution about the line between its spherical joints (mass centre"
             f" {uneven.off:.3g} m off it, moments of inertia unlike by {uneven.uneven:.3g} kg m^2); its spin is held at"
@@ -232,6 +232,20 @@ def _judged(model: mujoco.MjModel, closures: Closures, site: int) -> list[tuple[
         )
         found.append((rod, refusal, note))
     return found
+
+
+def _in_fluid(model: mujoco.MjModel, name: str) -> Refusal | None:
+    """MuJoCo's fluid sees a box in place of a body, so that its force depends on a spin that nothing determines."""
+    if not (model.opt.density or model.opt.viscosity):
+        return None
+    return Refusal(
+        f'a fluid acts on rod "{name}", which hangs between two spherical joints; its force depends on how far the rod'
+        " has turned about its own axis, which nothing determines",
+        "option",
+        "density" if model.opt.density else "viscosity",
+        "set density and viscosity to zero, or put two hinges in place of one of the spherical joints",
+        "fluid on a rod",
+    )
 
 
 def _off_axis(model: mujoco.MjModel, rod: Rod, shape: RodFrame, site: int) -> Refusal | None:
