@@ -46,7 +46,7 @@ class DenseOracle:
         model, data = self.model, self.data
         data.qpos = qpos
         mujoco.mj_fwdPosition(model, data)
-        rows = np.asarray(data.efc_type) == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+        rows = np.asarray(data.efc_type) == mujoco.mjtConstraint.mjCNSTR_EQUALITY.value
         whole = np.array(data.efc_J).reshape(-1)[: len(rows) * model.nv].reshape(-1, model.nv)
         loops = whole[rows][:, self.moving]
         spins = self._spins(loops) if self.spins_rest else []

@@ -51,27 +51,26 @@ def import_model(source: Path, directory: Path, actuated: tuple[str, ...]) -> No
 def print_proposal(path: Path, actuated: tuple[str, ...], everything: bool, json: bool) -> int:
     """Print what was understood of a file, all that is refused, and a campaign to copy; returns the exit code."""
     import dataclasses
+    from json import dumps
 
     from rich.table import Table
     from rich.text import Text
 
-    from workbench.commands.model_tables import print_json
     from workbench.console import out
     from workbench.importing.proposal import propose
     from workbench.importing.write import campaign_text
 
     found = propose(path, actuated)
     if json:
-        print_json(
-            {
-                "file": str(path),
-                "survey": dataclasses.asdict(found.survey) | {"qpos": found.survey.qpos.tolist()},
-                "setup": dataclasses.asdict(found.setup),
-                "notes": [*found.notes, *found.prepared.notes],
-                "problem": found.problem,
-                "refusals": [dataclasses.asdict(refusal) for refusal in found.refusals],
-            }
-        )
+        record = {
+            "file": str(path),
+            "survey": dataclasses.asdict(found.survey) | {"qpos": found.survey.qpos.tolist()},
+            "setup": dataclasses.asdict(found.setup),
+            "notes": [*found.notes, *found.prepared.notes],
+            "problem": found.problem,
+            "refusals": [dataclasses.asdict(refusal) for refusal in found.refusals],
+        }
+        out.print(dumps(record, indent=1, ensure_ascii=False), soft_wrap=True, markup=False)
         return 1 if found.problem else 0
     out.print(Text(f"{path}: no closed form named", style="bold"), soft_wrap=True)
     facts = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))

@@ -114,6 +114,8 @@ def _notes(seen: Survey) -> list[str]:
         notes.append(f"driven by the file and not here, since they follow from the others: {', '.join(seen.dropped)}")
     if seen.added:
         notes.append(f"not driven by the file, but nothing else moves them: {', '.join(seen.added)}")
+    if seen.nameless:
+        notes.append(f"joints without a name cannot be driven, give them one: {', '.join(seen.nameless)}")
     return notes
 
 
@@ -121,7 +123,7 @@ def _parameters(where: Places) -> tuple[tuple[str, str], ...]:
     """Masses of what moves, and gravity."""
     found: dict[str, str] = {}
     for body in where.moving:
-        name = "m_" + re.sub(r"\W", "_", body)[:36]
+        name = "m_" + re.sub(r"\W", "_", body, flags=re.ASCII)[:36]
         if body and len(body.split()) == 1 and name not in found and len(found) < PARAMETERS:
             found[name] = f"mass {body}"
     return (*found.items(), ("g", "gravity"))

@@ -16,7 +16,7 @@ SAMPLES = 101
 def campaign_text(found: Proposal, name: str, model: str) -> str:
     """The campaign of a proposal; *model* is the path of the MJCF as the campaign sees it."""
     setup = found.setup
-    lines = [f"# {note}" for note in found.notes]
+    lines = [f"# {_one_line(note)}" for note in found.notes]
     lines += ["format = 1", f"name = {_text(name)}", f"title = {_text(name)}", f"model = {_text(model)}"]
     lines += ["# driven joints, in the order of q and tau", f"actuated = {_list(setup.actuated)}"]
     if setup.platform_site:
@@ -61,6 +61,11 @@ def write_folder(found: Proposal, directory: Path) -> Path:
     except OSError as error:
         raise OutputError(f"{directory}: {error.strerror or error}") from error
     return campaign
+
+
+def _one_line(text: str) -> str:
+    """Without what a comment may not hold: line ends and control characters of names."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def _text(value: str) -> str:

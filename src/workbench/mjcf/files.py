@@ -23,6 +23,7 @@ MAX_PIXELS = 4096
 """width and height of a picture; it is unpacked in memory"""
 
 MESHES = (".stl", ".obj", ".msh")
+POINTER = b"version https://git-lfs"
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -41,7 +42,8 @@ def read_text(path: Path) -> str:
     try:
         return read_bytes(path, MAX_BYTES).decode()
     except UnreadableError as error:
-        raise ModelError(f"{path}: {error}", file=str(path)) from error
+        kind = "; a model is an XML file" if str(error).startswith("is ") else ""
+        raise ModelError(f"{path}: {error}{kind}", file=str(path)) from error
     except UnicodeDecodeError as error:
         raise ModelError(f"{path}: not UTF-8 text (byte {error.start})", file=str(path)) from error
     except ValueError as error:  # a null byte in the name
@@ -63,13 +65,13 @@ def read_bytes(path: Path, limit: int) -> bytes:
             status = os.fstat(stream.fileno())
             if not stat.S_ISREG(status.st_mode):
                 kind = "a directory" if stat.S_ISDIR(status.st_mode) else "no regular file"
-                raise UnreadableError(f"is {kind}; a model is an XML file")
+                raise UnreadableError(f"is {kind}")
             if status.st_size > limit:
                 raise UnreadableError(f"{status.st_size} bytes; allowed: at most {limit}")
             return stream.read(limit + 1)
     except OSError as error:
         if error.errno == errno.EISDIR or path.is_dir():
-            raise UnreadableError("is a directory; a model is an XML file") from error
+            raise UnreadableError("is a directory") from error
         raise UnreadableError(error.strerror or str(error)) from error
 
 
@@ -110,6 +112,8 @@ def read_asset(path: Path, tag: str, content_type: str) -> bytes:
     if suffix not in known or content_type not in ("", *(f"{kind}/{suffix[1:]}" for kind in ("model", "image"))):
         raise UnreadableError(f"of a kind that is not read ({', '.join(known)})")
     found = read_bytes(path, MAX_ASSET)
+    if found.startswith(POINTER):
+        raise UnreadableError("a Git LFS pointer in place of the file")
     if suffix == ".png":
         _check_png(found)
     return found

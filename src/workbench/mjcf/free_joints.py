@@ -17,6 +17,7 @@ from workbench.errors import ModelError, did_you_mean
 
 SLIDES = ("x", "y", "z")
 SIX = 6
+LOOPS = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
 FREE = mujoco.mjtJoint.mjJNT_FREE
 
 
@@ -123,7 +124,7 @@ def floating_bases(model: mujoco.MjModel) -> list[str]:
     driven = {
         int(model.actuator_trnid[actuator, 0])
         for actuator in range(model.nu)
-        if model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT
+        if mujoco.mjtTrn(model.actuator_trntype[actuator]) == mujoco.mjtTrn.mjTRN_JOINT
     }
     found = []
     for body in range(1, model.nbody):
@@ -139,7 +140,7 @@ def held_roots(model: mujoco.MjModel) -> set[int]:
     held: set[int] = set()
     body_kind, site_kind = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
     for eq in range(model.neq):
-        if not model.eq_active0[eq] or model.eq_type[eq] not in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
+        if not model.eq_active0[eq] or mujoco.mjtEq(model.eq_type[eq]) not in LOOPS:
             continue
         kind = mujoco.mjtObj(model.eq_objtype[eq])
         ends = [int(model.eq_obj1id[eq]), int(model.eq_obj2id[eq])]

@@ -11,6 +11,7 @@ from workbench.errors import ModelError
 from workbench.mjcf.assets import parse
 from workbench.mjcf.refusal import Refusal, joined
 from workbench.mjcf.source import Source
+from workbench.mjcf.text import scan
 
 LISTS = {
     "joint": "joints", "geom": "geoms", "body": "bodies", "site": "sites", "actuator": "actuators", "pair": "pairs",
@@ -34,7 +35,21 @@ def line_of(source: Source, spec: mujoco.MjSpec, tag: str, name: str) -> int | N
         elements = elements[int(name[1:]) :][:1]
     else:
         elements = [element for element in elements if element.name == name]
-    match = LINE.search(elements[0].info or "") if elements else None
+    if not elements:
+        return None
+    match = LINE.search(elements[0].info or "")
+    if match:
+        return int(match.group(1))
+    return _free_line(source, spec, elements[0]) if tag == "joint" else None
+
+
+def _free_line(source: Source, spec: mujoco.MjSpec, joint: mujoco.MjsJoint) -> int | None:
+    """MuJoCo keeps no line of a ``<freejoint>``: it is found by its place among them, else the body's is taken."""
+    lines = [element.line for element in scan(source.text, source.file) if element.tag == "freejoint"]
+    silent = [other for other in spec.joints if not other.info]
+    if len(lines) == len(silent):
+        return lines[silent.index(joint)]
+    match = LINE.search(joint.parent.info or "")
     return int(match.group(1)) if match else None
 
 

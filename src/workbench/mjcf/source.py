@@ -122,7 +122,7 @@ class _Reader:
             try:
                 path = self._path(folder, own, name)
                 inner = read_text(path)
-            except UnreadableError as error:
+            except (UnreadableError, ModelError) as error:
                 raise ModelError(f'{where}: <include file="{name}">: {error}', file=file) from error
             if path in included or path in stack:
                 raise ModelError(f'{where}: <include file="{name}">: is included already', file=file)
@@ -197,7 +197,7 @@ class _Reader:
             if path in self.keys:
                 return self.keys[path]
             text = read_text(path)
-        except UnreadableError as error:
+        except (UnreadableError, ModelError) as error:
             raise ModelError(f'{where}: <model file="{name}">: {error}') from error
         before = self.elements
         flat = self.document(text, str(path), path.parent, (*stack, path), frozenset())

@@ -19,7 +19,7 @@ from workbench.mjcf.setup import Setup
 from workbench.reference.closure import LoopCloser, constraint_jacobian
 from workbench.reference.engine import Engine
 from workbench.reference.mujoco_reference import Mobility
-from workbench.reference.structure import Structure, read_structure
+from workbench.reference.structure import Structure, structure_of
 from workbench.reference.tolerance import rank_of
 from workbench.robots.assumptions.check import Assumption, check_assumptions
 from workbench.robots.base import Mechanism
@@ -173,7 +173,7 @@ class _Closed:
 
     def __init__(self, loaded: LoadedModel) -> None:
         self.loaded = loaded
-        self.structure: Structure = read_structure(loaded.model, loaded.file)
+        self.structure: Structure = structure_of(loaded)
         self.engine = Engine(loaded.model, frames=self.structure.frames)
         self.closer = LoopCloser(self.engine, self.structure)
         self.jacobian, residuals = constraint_jacobian(

@@ -19,7 +19,6 @@ from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf.compile import custom_text
-from workbench.mjcf.lines import with_lines
 from workbench.mjcf.setup import Setup
 from workbench.reference.body_forces import acts_on_bodies, felt_gravity
 from workbench.reference.closure import Assembly, LoopCloser
@@ -28,7 +27,7 @@ from workbench.reference.freedoms import check_freedoms
 from workbench.reference.kernels import projection, velocities
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
-from workbench.reference.structure import Structure, read_structure
+from workbench.reference.structure import Structure, structure_of
 from workbench.reference.tolerance import rank_of
 from workbench.robots.load import LoadedModel, load_model
 
@@ -118,10 +117,7 @@ class MujocoReference:
         self.file = loaded.file
         self.loaded = loaded
         self._threads = threads
-        try:
-            self._structure = read_structure(loaded.model, loaded.file)
-        except ModelError as error:
-            raise (with_lines(error, loaded.prepared.source) if loaded.prepared else error) from None
+        self._structure = structure_of(loaded)
         self._engines = {"distributed": Engine(loaded.model, threads, self._structure.frames)}
         self._mass_layout = mass_layout(loaded.model)
         self._closer = LoopCloser(self._engines["distributed"], self._structure)

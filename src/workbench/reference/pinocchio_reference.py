@@ -21,7 +21,7 @@ from workbench.reference.kinds import CONNECT, SPIN, WELD
 from workbench.reference.pinocchio_limits import refuse_uncounted
 from workbench.reference.pinocchio_loops import PinocchioLoops
 from workbench.reference.pinocchio_reader import import_pinocchio, read, without_inertia
-from workbench.reference.structure import read_structure
+from workbench.reference.structure import structure_of
 from workbench.robots.load import LoadedModel, load_model
 
 MASS_MODELS = ("distributed", "lumped")
@@ -80,7 +80,7 @@ class PinocchioReference:
         loaded = load_model(path, parameters, setup)
         self.file = loaded.file
         self._compiled = loaded.model
-        structure = self._structure = read_structure(loaded.model, loaded.file)
+        structure = self._structure = structure_of(loaded)
         sites = {structure.platform_site}
         refuse_uncounted(loaded.model, structure)
         for kind, _, _, one, two in structure.blocks.tolist():

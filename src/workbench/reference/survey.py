@@ -57,6 +57,8 @@ class Survey:
     """joints that the file does not drive, without which the motion is not determined"""
     undriven: int
     """freedoms that no hinge or slide can drive: spins of rods"""
+    nameless: tuple[str, ...]
+    """hinges and slides, with their bodies, that could drive some of these if they had names"""
 
 
 @engine_warnings()
@@ -105,11 +107,23 @@ def survey(model: mujoco.MjModel, wanted: tuple[str, ...] = ()) -> Survey:
         chosen.append(best)
         added.append(best)
     loops = int(np.count_nonzero(model.eq_active0)) if model.neq else 0
+    nameless = _nameless(model, place) if len(motions) > len(basis) else ()
     return Survey(
         bodies=model.nbody - 1, joints=model.njnt, loops=loops, rows=len(jacobian), rank=rank, mobility=len(motions),
         residual=residual, qpos=qpos, fix_base=fix_base, loose=loose, actuated=tuple(chosen), dropped=tuple(dropped),
-        added=tuple(added), undriven=len(motions) - len(basis),
+        added=tuple(added), undriven=len(motions) - len(basis), nameless=nameless,
     )  # fmt: skip
+
+
+def _nameless(model: mujoco.MjModel, place: dict[int, int]) -> tuple[str, ...]:
+    obj = mujoco.mjtObj
+    return tuple(
+        f"#{j} of body {mujoco.mj_id2name(model, obj.mjOBJ_BODY, int(model.jnt_bodyid[j]))}"
+        for j in range(model.njnt)
+        if mujoco.mjtJoint(model.jnt_type[j]) in SCALAR
+        and not mujoco.mj_id2name(model, obj.mjOBJ_JOINT, j)
+        and int(model.jnt_dofadr[j]) in place
+    )
 
 
 def _depth(model: mujoco.MjModel, dof: int) -> int:

@@ -15,7 +15,7 @@ from workbench.errors import MotionError, WorkbenchError
 from workbench.reference import MujocoReference
 from workbench.reference.closure import LoopCloser
 from workbench.reference.engine import Engine
-from workbench.reference.structure import read_structure
+from workbench.reference.structure import structure_of
 from workbench.robots.load import open_model
 
 MOST_FRAMES = 6000
@@ -45,7 +45,7 @@ def home_pose(path: Path) -> Poses:
     """
     loaded = open_model(path)
     try:
-        structure = read_structure(loaded.model, loaded.file)
+        structure = structure_of(loaded)
         qpos = LoopCloser(Engine(loaded.model, frames=structure.frames), structure).home
     except WorkbenchError:
         model = loaded.model
