@@ -17,7 +17,7 @@ from workbench.importing.proposal import propose
 from workbench.importing.write import campaign_text, write_folder
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
-from workbench.reference.left_out import look, refuse_crossings, worth
+from workbench.reference.crossings import look, refuse_crossings, worth
 
 MOTOR = '<actuator><motor joint="crank"/></actuator>'
 TREE = """<mujoco><compiler angle="radian"/><worldbody>

@@ -183,7 +183,7 @@ LEFT_OUT = {
 def test_limits_and_contacts_are_left_out(
     tmp_path: Path, single: MujocoReference, what: str, ignore: tuple[str, ...]
 ) -> None:
-    """Torques are the same; what a motion meets is `workbench.reference.left_out`'s business."""
+    """Torques are the same; what a motion meets is `workbench.reference.crossings`'s business."""
     assert LEFT_OUT[what] != FOURBAR
     expected = whole_turn(single).tau
     found = reference(tmp_path, LEFT_OUT[what], ("crank",), initial=GUESS, ignore=ignore)

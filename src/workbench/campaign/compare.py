@@ -19,7 +19,7 @@ from workbench.campaign.unloaded import joint_error, largest_reaction, normalise
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdict_of
 from workbench.errors import ModelError, MotionError
 from workbench.reference import MujocoReference, ReferenceResult
-from workbench.reference.left_out import look, refuse_crossings, worth
+from workbench.reference.crossings import look, refuse_crossings, worth
 from workbench.reference.raw_inverse import raw_mj_inverse
 from workbench.reference.skeleton import skeleton
 

@@ -17,7 +17,7 @@ from workbench.mjcf.prepared import Prepared, open_source
 from workbench.mjcf.refusal import Refusal
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
-from workbench.reference.left_out import look
+from workbench.reference.crossings import look
 from workbench.reference.survey import Places, Survey, places, survey
 
 SAMPLES = 51

@@ -22,7 +22,7 @@ IGNORABLE = ("contacts", "limits", "springs", "tendons", "free bodies")
 """What a campaign may leave out of account."""
 
 LEFT_OUT = ("contact", "limit")
-"""What is always left out, and looked at along the motion (`workbench.reference.left_out`)."""
+"""What is always left out, and looked at along the motion (`workbench.reference.crossings`)."""
 
 TURN = 2.0 * np.pi
 """A hinge that begins further than one turn from zero was written in degrees."""
