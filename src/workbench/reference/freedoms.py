@@ -9,6 +9,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError
 from workbench.reference.structure import Structure
+from workbench.reference.tolerance import KEY, Tolerance
 
 RANK_TOLERANCE = 1e-9
 """A singular value of the passive loop Jacobian below this fraction of the largest one counts as zero."""
@@ -18,6 +19,9 @@ NEARBY = 1e-2
 
 SHOWN = 0.1
 """A joint is named when it takes part in a loose motion by more than this fraction of the one that moves most."""
+
+DIGITS_AT_MOST = 1e-2
+"""Of the robot's size: a tolerance beyond this is not proposed; the mechanism is another one."""
 
 Reclose = Callable[[FloatArray], FloatArray]
 """A velocity ``(nv,)`` to move the home pose by -> constraint Jacobian ``(m, nv)`` of the closed pose nearest to it."""
@@ -65,6 +69,30 @@ def check_freedoms(
         file=structure.file,
         joint=structure.dof_names[structure.passive[int(np.argmax(np.abs(direction)))]],
         direction=direction.tolist(),
+    )
+
+
+def refuse_locked(structure: Structure, jacobian: FloatArray, tolerance: Tolerance) -> None:
+    """Refuse loops that leave no freedom; where a few digits are to blame, say with which tolerance they leave one.
+
+    Raises
+    ------
+    ModelError
+        Always.
+    """
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    nearly = 1.5 * float(values[jacobian.shape[1] - 1] / values[0]) * tolerance.size
+    way = (
+        f"; if axes or anchors in the file agree only to some digits, it needs a closure tolerance of {nearly:.1e} m"
+        f' (<text name="{KEY}">)'
+        if nearly < DIGITS_AT_MOST * tolerance.size
+        else ""
+    )
+    raise ModelError(
+        f"{structure.file}: the loops leave no freedom, so that {', '.join(structure.joint_names)} cannot move;"
+        f" take an equality out, or add a joint{way}",
+        file=structure.file,
+        tolerance=nearly,
     )
 
 

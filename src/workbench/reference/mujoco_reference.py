@@ -23,7 +23,7 @@ from workbench.mjcf.setup import Setup
 from workbench.reference.body_forces import acts_on_bodies, felt_gravity
 from workbench.reference.closure import Assembly, LoopCloser
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
-from workbench.reference.freedoms import check_freedoms
+from workbench.reference.freedoms import check_freedoms, refuse_locked
 from workbench.reference.kernels import projection, velocities
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
@@ -368,13 +368,13 @@ class MujocoReference:
         tolerance = self._closer.tolerance
         check_freedoms(structure, home, self._closer.jacobian_near_home, tolerance.relative)
         if not self.mobility().mobility:
-            raise ModelError(
-                f"{self.file}: the loops leave no freedom, so that {', '.join(structure.joint_names)} cannot move;"
-                " take an equality out, or add a joint",
-                file=self.file,
-            )
-        if excess_actuators(home, structure.passive, structure.actuated, tolerance.relative):
-            columns, tables = leading(structure, home, tolerance.relative)
+            refuse_locked(structure, home, tolerance)
+        if tolerance.few_digits:
+            excess = len(structure.actuated) - self.mobility().mobility
+        else:
+            excess = excess_actuators(home, structure.passive, structure.actuated)
+        if excess > 0:
+            columns, tables = leading(structure, home, rank_of(home, tolerance))
             self._leader = self._led_by(dataclasses.replace(tables, home_qpos=self._closer.home)), columns
 
     def _led_by(self, structure: Structure) -> MujocoReference:

@@ -31,8 +31,8 @@ rounding grows with its inverse; over the bundled campaigns they meet at 0.02 to
 PLAIN = 5e-12
 """Of the peak power: what the balance of a robot with few bodies reaches, and a large one's no longer does."""
 
-ROUNDING = 4.0
-"""Roundings in one term of energy or power: a position, a velocity, a product, a sum."""
+ROUNDING = 2.0
+"""Roundings in one term of energy or power: of the coordinate or velocity in it, and of the term."""
 
 HALVINGS = 6
 """How often a sample's step is halved at most, in search of the step where truncation meets rounding."""

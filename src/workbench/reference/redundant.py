@@ -29,10 +29,10 @@ CONSISTENT = 1e-9
 """rad or m, and times the speed: how far an excess actuator may be from where the others put it."""
 
 
-def left_null_space(matrix: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
+def left_null_space(matrix: FloatArray) -> FloatArray:
     """Orthonormal basis ``(m, k)`` of all y with ``y^T matrix = 0``."""
     u, values, _ = np.linalg.svd(matrix, full_matrices=True)
-    rank = int(np.count_nonzero(values > tolerance * values.max(initial=0.0)))
+    rank = int(np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0)))
     basis: FloatArray = u[:, rank:]
     return basis
 
@@ -43,16 +43,15 @@ def self_stress(jacobian: FloatArray, passive: np.ndarray, actuated: np.ndarray)
     return free, jacobian[:, actuated].T @ free
 
 
-def excess_actuators(jacobian: FloatArray, passive: np.ndarray, actuated: np.ndarray, tolerance: float = 1e-9) -> int:
+def excess_actuators(jacobian: FloatArray, passive: np.ndarray, actuated: np.ndarray) -> int:
     """Number of actuators beyond the freedoms: how many independent torques strain the mechanism against itself."""
     if not len(jacobian):
         return 0
     scale = max(float(np.abs(jacobian).max()), 1e-300)
-    free = left_null_space(jacobian[:, passive], max(RANK_TOLERANCE, 0.1 * tolerance))
-    return int(np.linalg.matrix_rank(jacobian[:, actuated].T @ free, tol=tolerance * scale))
+    return int(np.linalg.matrix_rank(self_stress(jacobian, passive, actuated)[1], tol=1e-9 * scale))
 
 
-def leading(structure: Structure, jacobian: FloatArray, tolerance: float = 1e-9) -> tuple[np.ndarray, Structure]:
+def leading(structure: Structure, jacobian: FloatArray, rank: int) -> tuple[np.ndarray, Structure]:
     """Choose as many actuators as there are freedoms, those that determine the rest best.
 
     Parameters
@@ -61,13 +60,14 @@ def leading(structure: Structure, jacobian: FloatArray, tolerance: float = 1e-9)
         Tables of a mechanism with excess actuators.
     jacobian
         Constraint Jacobian ``(m, nv)`` at home.
+    rank
+        Its rank.
 
     Returns
     -------
     numpy.ndarray, Structure
         Their places among the actuated joints, and the tables in which the other actuated joints are passive.
     """
-    rank = np.linalg.matrix_rank(jacobian, tol=tolerance * float(np.abs(jacobian).max()))
     motions = np.linalg.svd(jacobian, full_matrices=True)[2][rank:]
     order = qr(motions[:, structure.actuated], pivoting=True, mode="r")[1]
     chosen = np.sort(order[: len(motions)])
