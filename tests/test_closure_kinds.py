@@ -141,7 +141,8 @@ def stewart(joints: str) -> str:
         way = np.array([0.02, -0.01, 0.5]) + corner - foot
         x, y, z = (repr(float(value)) for value in way)
         legs += (
-            f'<body name="u{k}" pos="{float(foot[0])!r} {float(foot[1])!r} 0"><joint name="ux{k}" axis="1 0 0" damping="0.05"/>'
+            f'<body name="u{k}" pos="{float(foot[0])!r} {float(foot[1])!r} 0">'
+            f'<joint name="ux{k}" axis="1 0 0" damping="0.05"/>'
             f'<joint name="uy{k}" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 {x} {y} {z}" size=".01" mass=".5"/>'
             f'<body name="l{k}" pos="{x} {y} {z}"><joint name="l{k}" type="slide" axis="{x} {y} {z}"/>'
             '<geom size=".02" mass=".3"/></body></body>'

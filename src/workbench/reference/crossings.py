@@ -15,6 +15,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError, WorkbenchError
 from workbench.mjcf.free_joints import user_qpos
+from workbench.reference.left_out import MOST_POSES, limits_left, touches
 from workbench.reference.mujoco_reference import MujocoReference, ReferenceResult
 
 INSIDE = 1e-9
@@ -22,9 +23,6 @@ INSIDE = 1e-9
 
 TOUCHING = 1e-9
 """m by which geoms have to overlap"""
-
-SAMPLES = 200
-"""poses of a motion at which contacts are looked for"""
 
 NAMED = 4
 
@@ -128,43 +126,17 @@ def _limits(user: mujoco.MjModel, poses: FloatArray) -> tuple[int, list[Crossing
     """How many limits there are, and those that the poses ``(n, nq)`` leave."""
     if _disabled(user, "limit") or not len(poses):
         return 0, []
-    obj, kinds = mujoco.mjtObj, mujoco.mjtJoint
-    tracks: list[tuple[str, str, FloatArray, tuple[float, float]]] = []
-    for joint in (joint for joint in range(user.njnt) if user.jnt_limited[joint]):
-        at, kind = int(user.jnt_qposadr[joint]), mujoco.mjtJoint(user.jnt_type[joint])
-        name = f'joint "{_name(user, obj.mjOBJ_JOINT, joint)}"'
-        unit = "m" if kind == kinds.mjJNT_SLIDE else "rad"
-        if kind == kinds.mjJNT_BALL:
-            angle = 2.0 * np.arccos(np.clip(np.abs(poses[:, at]), 0.0, 1.0))
-            tracks.append((name, unit, angle, (-np.inf, float(user.jnt_range[joint].max()))))
-        else:
-            low, high = map(float, user.jnt_range[joint])
-            tracks.append((name, unit, poses[:, at], (low, high)))
-    tendons = [tendon for tendon in range(user.ntendon) if user.tendon_limited[tendon]]
-    if tendons:
-        data, lengths = mujoco.MjData(user), np.zeros((len(poses), user.ntendon))
-        for row, qpos in enumerate(poses):
-            data.qpos = qpos
-            mujoco.mj_kinematics(user, data)
-            mujoco.mj_comPos(user, data)
-            mujoco.mj_tendon(user, data)
-            lengths[row] = data.ten_length
-        tracks += [
-            (f'tendon "{_name(user, obj.mjOBJ_TENDON, t)}"', "", lengths[:, t], _pair_of(user.tendon_range[t]))
-            for t in tendons
-        ]
-    crossings = []
-    for name, unit, values, (low, high) in tracks:
-        beyond = np.maximum(low - values, values - high)
-        worst = int(np.argmax(beyond))
-        if beyond[worst] > INSIDE:
-            text = f"{name} reaches {values[worst]:.4g} {unit}, its range is {low:.4g} to {high:.4g} {unit}".rstrip()
-            crossings.append(Crossing("limits", worst, text))
-    return len(tracks), crossings
-
-
-def _pair_of(values: FloatArray) -> tuple[float, float]:
-    return float(values[0]), float(values[1])
+    count = int(np.count_nonzero(user.jnt_limited)) + int(np.count_nonzero(user.tendon_limited))
+    return count, [
+        Crossing(
+            "limits",
+            found.sample,
+            f'{found.element} "{found.name}" reaches {found.value:.4g} {found.unit}, its range is {found.lower:.4g} to'
+            f" {found.upper:.4g} {found.unit}".rstrip(),
+        )
+        for found in limits_left(user, poses)
+        if max(found.lower - found.value, found.value - found.upper) > INSIDE
+    ]
 
 
 def _contacts(user: mujoco.MjModel, poses: FloatArray, home: FloatArray) -> tuple[list[str], list[Crossing]]:
@@ -173,52 +145,31 @@ def _contacts(user: mujoco.MjModel, poses: FloatArray, home: FloatArray) -> tupl
         return [], []
     if not (user.geom_contype | user.geom_conaffinity).any() and not user.npair:
         return [], []
-    data = mujoco.MjData(user)
-    before = _touching(user, data, home)
-    chosen = np.unique(np.linspace(0, len(poses) - 1, min(SAMPLES, len(poses))).astype(int))
-    first: dict[tuple[int, int], tuple[int, float]] = {}
-    for sample in chosen:
-        for pair, depth in _touching(user, data, poses[sample]).items():
-            if pair not in before and pair not in first:
-                first[pair] = (int(sample), depth)
+    before = [(one.one, one.two) for one in touches(user, home[None]) if one.depth > TOUCHING]
+    new = [one for one in touches(user, poses) if one.depth > TOUCHING and (one.one, one.two) not in before]
+    looked = min(len(poses), MOST_POSES)
     notes = []
     if before:
-        shown = ", ".join(_pair(user, pair) for pair in list(before)[:NAMED])
+        shown = ", ".join(_pair(user, pair) for pair in before[:NAMED])
         more = f" and {len(before) - NAMED} more" if len(before) > NAMED else ""
         notes.append(f"contacts are left out; in the home pose these touch already: {shown}{more}")
-    elif not first:
-        notes.append(f"contacts are left out; nothing touches at {len(chosen)} poses of the motion")
-    if before and not first:
-        notes.append(f"contacts: nothing else touches at {len(chosen)} poses of the motion")
+    if not new:
+        notes.append(
+            f"contacts are left out; nothing {'else ' if before else ''}touches at {looked} poses of the motion"
+        )
     crossings = [
-        Crossing("contacts", sample, f"{_pair(user, pair)} touch, {depth:.2g} m deep")
-        for pair, (sample, depth) in sorted(first.items(), key=lambda item: item[1][0])
+        Crossing("contacts", one.sample, f"{_pair(user, (one.one, one.two))} touch, {one.depth:.2g} m deep")
+        for one in sorted(new, key=lambda one: one.sample)
     ]
     return notes, crossings
 
 
-def _touching(model: mujoco.MjModel, data: mujoco.MjData, qpos: FloatArray) -> dict[tuple[int, int], float]:
-    data.qpos = qpos
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    mujoco.mj_collision(model, data)
-    found: dict[tuple[int, int], float] = {}
-    for contact in data.contact[: data.ncon]:
-        if contact.dist < -TOUCHING:
-            pair = (int(min(contact.geom)), int(max(contact.geom)))
-            found[pair] = max(found.get(pair, 0.0), -float(contact.dist))
-    return found
-
-
-def _pair(model: mujoco.MjModel, pair: tuple[int, int]) -> str:
-    obj = mujoco.mjtObj
-    names = []
-    for geom in pair:
-        body = mujoco.mj_id2name(model, obj.mjOBJ_BODY, int(model.geom_bodyid[geom])) or "a body without a name"
-        own = mujoco.mj_id2name(model, obj.mjOBJ_GEOM, geom)
-        names.append(f'geom "{own}" of {body}' if own else f"a geom of {body}")
-    return " and ".join(names)
-
-
-def _name(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
-    return mujoco.mj_id2name(model, kind, int(index)) or f"#{index}"
+def _pair(model: mujoco.MjModel, pair: tuple[str, str]) -> str:
+    """Geoms by their names and bodies; one without a name is ``#3``."""
+    texts = []
+    for name in pair:
+        geom = int(name[1:]) if name.startswith("#") and name[1:].isdecimal() else model.geom(name).id
+        body = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, int(model.geom_bodyid[geom]))
+        own = f'geom "{name}"' if model.geom(geom).name else "a geom"
+        texts.append(f"{own} of {body or 'a body without a name'}")
+    return " and ".join(texts)

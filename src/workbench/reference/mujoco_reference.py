@@ -162,11 +162,6 @@ class MujocoReference:
         """All velocities per actuated one, ``(n, nv, na)``."""
         return self._assemble(q).tangent
 
-    @property
-    def text(self) -> str:
-        """The MJCF with the overrides written into it; what a campaign says of it is in `spec` only."""
-        return self.loaded.text
-
     def spec(self) -> mujoco.MjSpec:
         """A fresh specification of the model, to be changed and compiled."""
         return self.loaded.spec()
