@@ -37,6 +37,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "errors",
         "data_files",
         "limits",
+        "schema",
+        "documents",
         "_version",
     ),
 )
