@@ -40,6 +40,9 @@ OPTIONS: dict[str, tuple[Callable[[Compiler], bool], Callable[[Compiler], None]]
 
 def compiler_changes(source: Source) -> tuple[str, ...]:
     """One line for each option of ``<compiler>`` that changes masses or inertias of *source*."""
+    whole = "".join([source.text, *(model.decode() for model in source.models.values())])
+    if not any(name in whole for name in OPTIONS):
+        return ()
     spec = parse(source)
     used = [name for name, (uses, _) in OPTIONS.items() if uses(spec.compiler)]
     if not used:

@@ -15,6 +15,7 @@ from workbench.mjcf.compiler_masses import compiler_changes
 from workbench.mjcf.same_robot import check_same_robot
 from workbench.mjcf.setup import Preparation, Setup, plan, start
 from workbench.mjcf.source import Source, read_source
+from workbench.mjcf.text import Element
 
 MOST_NAMED = 4
 
@@ -38,15 +39,15 @@ class Prepared:
         return self.preparation.apply(spec) if self.preparation else spec
 
 
-def open_source(text: str, file: str, folder: Path | None) -> Prepared:
-    """Compile a file as it lies.
+def open_source(text: str, file: str, folder: Path | None, elements: list[Element] | None = None) -> Prepared:
+    """Compile a file as it lies; *elements* are what `workbench.mjcf.text.scan` found in it, where that is known.
 
     Raises
     ------
     ModelError
         As `workbench.mjcf.source.read_source` and `workbench.mjcf.compile.compile_spec`.
     """
-    source = read_source(text, file, folder)
+    source = read_source(text, file, folder, elements)
     model = compile_spec(parse(source), file)
     return Prepared(source, None, model, model, file_notes(source))
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from types import MappingProxyType
 from xml.sax.saxutils import quoteattr
 
 from workbench.errors import ModelError
@@ -45,15 +44,15 @@ class Source:
     file: str
     text: str
     """includes put in; as many lines as the user's file"""
-    models: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}), repr=False)
+    models: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     """models from which ``<attach>`` takes"""
-    assets: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}), repr=False)
-    missing: Mapping[str, Missing] = field(default_factory=lambda: MappingProxyType({}))
+    assets: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+    missing: Mapping[str, Missing] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
     """what was read beside the model itself"""
 
 
-def read_source(text: str, file: str, folder: Path | None) -> Source:
+def read_source(text: str, file: str, folder: Path | None, elements: list[Element] | None = None) -> Source:
     """Put together what a model reads.
 
     Parameters
@@ -62,6 +61,8 @@ def read_source(text: str, file: str, folder: Path | None) -> Source:
         The MJCF and the name under which errors speak of it.
     folder
         The directory of the model; nothing outside is read. None: nothing is read at all.
+    elements
+        What `workbench.mjcf.text.scan` found in *text*, where it is known already.
 
     Raises
     ------
@@ -70,13 +71,13 @@ def read_source(text: str, file: str, folder: Path | None) -> Source:
         allowed, counted with all copies.
     """
     reader = _Reader(folder)
-    flat = reader.document(text, file, folder or Path(), (), frozenset())
+    flat = reader.document(text, file, folder or Path(), (), elements)
     return Source(
         file,
         flat,
-        MappingProxyType(reader.models),
-        MappingProxyType(reader.assets),
-        MappingProxyType(reader.missing),
+        reader.models,
+        reader.assets,
+        reader.missing,
         tuple(reader.files),
     )
 
@@ -93,13 +94,15 @@ class _Reader:
         self.keys: dict[Path, str] = {}
         self.elements = 0
 
-    def document(self, text: str, file: str, folder: Path, stack: tuple[Path, ...], included: frozenset[Path]) -> str:
+    def document(
+        self, text: str, file: str, folder: Path, stack: tuple[Path, ...], elements: list[Element] | None = None
+    ) -> str:
         """A whole model, also one that another attaches from: includes put in, names of files replaced."""
         if len(stack) > DEEPEST:
             raise ModelError(f"{file}: models inside models, deeper than {DEEPEST}", file=file)
-        elements = scan(text, file)
+        elements = scan(text, file) if elements is None else elements
         if any(element.tag == "include" for element in elements):
-            text = self._expanded(text, elements, file, folder, folder, stack, set(included))
+            text = self._expanded(text, elements, file, folder, folder, stack, set())
             elements = scan(text, file)
         return self._named(text, elements, file, folder, stack)
 
@@ -200,7 +203,7 @@ class _Reader:
         except (UnreadableError, ModelError) as error:
             raise ModelError(f'{where}: <model file="{name}">: {error}') from error
         before = self.elements
-        flat = self.document(text, str(path), path.parent, (*stack, path), frozenset())
+        flat = self.document(text, str(path), path.parent, (*stack, path))
         key = f"workbench_{len(self.keys):04d}.xml"
         self.keys[path] = key
         self.models[key] = flat.encode()

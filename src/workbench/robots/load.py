@@ -141,7 +141,7 @@ def open_model(path: str | Path) -> LoadedModel:
     found = find_model(path)
     text = read_text(found)
     elements = scan(text, file)
-    prepared = open_source(text, file, found.parent)
+    prepared = open_source(text, file, found.parent, elements)
     model = prepared.model
     kind = _kind(model, file)
     if kind is None:
@@ -250,7 +250,7 @@ def load_text(text: str, file: str, folder: Path | None = None) -> LoadedModel:
         See `load_model`.
     """
     elements = scan(text, file)
-    prepared = open_source(text, file, folder)
+    prepared = open_source(text, file, folder, elements)
     model = prepared.model
     kind = _kind(model, file)
     if kind is None:
