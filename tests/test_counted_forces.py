@@ -160,9 +160,8 @@ def test_what_actuators_add_is_found_per_joint() -> None:
 
 
 def test_actuator_effects_that_no_joint_can_hold_are_named() -> None:
-    text = GEARED.replace("</worldbody>", '<site name="s"/></worldbody>').replace(
-        "</actuator>", '<motor name="pull" site="s" refsite="s" gear="1 0 0 0 0 0" armature="0.1"/></actuator>'
-    )
+    tendon = '<tendon><fixed name="t"><joint joint="a" coef="1"/></fixed></tendon>'
+    text = GEARED.replace("<actuator>", f'{tendon}<actuator><motor name="pull" tendon="t" armature="0.1"/>')
     (refusal,) = actuator_effects(mujoco.MjModel.from_xml_string(text)).refusals
     assert refusal.name == "pull"
     assert refusal.tag == "actuator"

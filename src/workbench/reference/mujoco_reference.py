@@ -201,10 +201,11 @@ class MujocoReference:
         """What a reader of the results should know of the model, one line each."""
         found = self._structure.notes
         if self._closer.tolerance.few_digits:
+            gap = float(self._closer.at_home.residual[0])
+            at_home = f", open by {gap:.2g} m at home" if gap > self._closer.tolerance.closed else ""
             found += (
-                "loops that agree only to some digits: they are closed by least squares, open by"
-                f" {float(self._closer.at_home.residual[0]):.2g} m at home; what that is worth in torque is in the"
-                " error budget",
+                f"loops that agree only to some digits: they are closed by least squares{at_home}; what that is worth"
+                " in torque is in the error budget",
             )
         if self._structure.friction.passive.any():
             found += ("dry friction of a passive joint that rests counts as zero, the middle of what it may be",)

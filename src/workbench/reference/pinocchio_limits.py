@@ -55,7 +55,7 @@ def _uncounted(model: mujoco.MjModel, structure: Structure) -> Iterator[str]:
         yield "armature or damping of an actuator"
     free = np.array([kind == mujoco.mjtJoint.mjJNT_FREE.value for kind in model.jnt_type], dtype=bool)
     if free.any():
-        yield f"the free joint {_joint(model, free)}"
+        yield f"the free {_joint(model, free)}"
     if np.ptp(_ball_values(model), axis=1).any():
         yield "a ball joint whose freedoms differ in armature"
 

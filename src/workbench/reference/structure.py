@@ -243,7 +243,7 @@ def _judged(model: mujoco.MjModel, closures: Closures, site: int) -> list[tuple[
         note = (
             f"rod {name}: no body of revolution about the line between its spherical joints (mass centre"
             f" {uneven.off:.3g} m off it, moments of inertia unlike by {uneven.uneven:.3g} kg m^2); its spin is held at"
-            " zero, by a moment that no actuator gives"
+            " zero, by a moment that no actuator gives; what that is worth in torque is in the error budget"
             if uneven.beyond(ROUND)
             else ""
         )
