@@ -80,7 +80,7 @@ class Form:
         message = issue["msg"].removeprefix("Value error, ").removeprefix("Input ")
         # a whole table or list says less than its key
         shown = "" if isinstance(issue["input"], dict | list) else f" = {shorten(repr(issue['input']))}"
-        return f"{where}{shown}: {message[0].lower()}{message[1:]}"
+        return f"{where}{shown}: {message[0].lower()}{message[1:]}" if where else f"{message[0].lower()}{message[1:]}"
 
     def _wrong_kind(self, table: Any) -> str:
         if not isinstance(table, dict):

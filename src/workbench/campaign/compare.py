@@ -21,6 +21,7 @@ from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdic
 from workbench.errors import ModelError, MotionError
 from workbench.hints import hint_of
 from workbench.reference import MujocoReference, ReferenceResult
+from workbench.reference.crossings import look, refuse_crossings, worth
 from workbench.reference.raw_inverse import raw_mj_inverse
 from workbench.reference.skeleton import skeleton
 
@@ -78,8 +79,8 @@ class CaseResult:
     facts: dict[str, Any] = field(repr=False)
     faults: Sequence[Fault] = ()
     """what the user's candidates did wrong"""
-    model_text: str = field(default="", repr=False)
-    """MJCF of the reference, the case's parameters written into it"""
+    model: Any = field(default=None, repr=False)
+    """MuJoCo's model of the reference, the case's parameters in it; with drawings only"""
     qpos: FloatArray | None = field(default=None, repr=False)
     """``(n, nq)`` its poses, MuJoCo's own coordinates; with drawings only"""
 
@@ -107,6 +108,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         torques = computed.torques
     except MotionError as error:
         raise at_time(error, motion.t) from error
+    left = _left_out(case, reference, next(iter(results.values())))
     platform = platform_of(case, next(iter(results.values())))
     series |= platform.columns()
     if robot.closed_kinematics:  # else the case's platform motion is the reference's own
@@ -132,15 +134,32 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual
     facts = _facts(case, reference, first, rows, platform) | {"evidence": evidence.facts()}
-    facts["warnings"] += hints
+    facts["warnings"] = [*facts["warnings"], *hints, *left]
     if effort.drawing:
         drawing = skeleton(reference, first.qpos)
         for point, place in drawing.points.items():
             series |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
-    poses = first.qpos if effort.drawing else None
+    poses, drawn = (first.qpos, reference.compiled()) if effort.drawing else (None, None)
     faults = tuple(computed.faults.values())
-    return CaseResult(case.name, rows, series, computed.noted(facts), faults, reference.text, poses)
+    return CaseResult(case.name, rows, series, computed.noted(facts), faults, drawn, poses)
+
+
+def _left_out(case: Case, reference: MujocoReference, result: ReferenceResult) -> tuple[str, ...]:
+    """What a reader has to know of the file and of what is left out of it.
+
+    Raises
+    ------
+    MotionError
+        The motion meets a limit or a contact that is left out, and the campaign does not say that it may.
+    """
+    ignore = case.robot.description.robot.setup.ignore
+    motion = case.motion
+    try:
+        notes = refuse_crossings(look(reference, result), ignore, motion.t)
+    except MotionError as error:
+        raise at_time(error, motion.t) from error
+    return (*reference.loaded.notes, *notes, *worth(reference, ignore, (motion.q, motion.qd, motion.qdd), result.tau))
 
 
 def _hints(

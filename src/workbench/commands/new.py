@@ -121,8 +121,19 @@ def new(
     loops: Annotated[
         int | None, typer.Option(min=1, max=20, help="Closed loops, one driven joint each. Default: one a joint.")
     ] = None,
+    source: Annotated[
+        Path | None, typer.Option("--from", metavar="FILE", help="A robot's MJCF as it lies, in place of a sketch.")
+    ] = None,
 ) -> None:
-    """Write a model with closed loops, its campaign, a formula to fill in and a test; they run at once."""
+    """Write a model with closed loops, its campaign, a formula to fill in and a test; they run at once.
+
+    With --from, the robot is a file's: its loops, joints to drive, platform, first guess and a small motion are found.
+    """
+    if source is not None:
+        from workbench.commands.import_model import import_model
+
+        import_model(source, directory, tuple(actuated or ()))
+        return
     joints = tuple(actuated or ["crank"])
     count = loops or len(joints)
     name = directory.name

@@ -15,11 +15,11 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError, WorkbenchError
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.compile import custom_text, engine_warnings
 from workbench.reference.closure import LoopCloser, constraint_jacobian
 from workbench.reference.engine import Engine
 from workbench.reference.result import Mobility
-from workbench.reference.structure import Structure, read_structure
+from workbench.reference.structure import Structure, structure_of
 from workbench.reference.tolerance import rank_of
 from workbench.robots.assumptions.check import Assumption, check_assumptions
 from workbench.robots.load import LoadedModel, load_model, open_model
@@ -158,6 +158,18 @@ def _counted(closed_form: Any) -> dict[str, int]:
     return count() if count else {}
 
 
+def names_itself(path: str | Path) -> bool:
+    """Whether a file says which closed form it is, or at least what its platform is.
+
+    Raises
+    ------
+    ModelError
+        As `check_model`.
+    """
+    loaded = open_model(path)
+    return loaded.description is not None or custom_text(loaded.model, "platform_site") is not None
+
+
 def _name(loaded: LoadedModel) -> str | None:
     return loaded.description.name if loaded.description is not None else None
 
@@ -167,7 +179,7 @@ class _Closed:
 
     def __init__(self, loaded: LoadedModel) -> None:
         self.loaded = loaded
-        self.structure: Structure = read_structure(loaded.model, loaded.file)
+        self.structure: Structure = structure_of(loaded)
         self.engine = Engine(loaded.model, frames=self.structure.frames)
         self.closer = LoopCloser(self.engine, self.structure)
         self.jacobian, residuals = constraint_jacobian(

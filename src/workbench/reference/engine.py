@@ -40,7 +40,7 @@ MOST_THREADS = 256
 
 
 @engine_warnings()
-def without_bar_inertia(text: str, bodies: tuple[str, ...], file: str) -> mujoco.MjModel:
+def without_bar_inertia(spec: mujoco.MjSpec, bodies: tuple[str, ...], file: str) -> mujoco.MjModel:
     """Compile the model with the rotational inertia of the named bodies removed: the lumped-mass assumption.
 
     The specification is changed and compiled again; writing into a compiled model can be silently wrong.
@@ -50,7 +50,6 @@ def without_bar_inertia(text: str, bodies: tuple[str, ...], file: str) -> mujoco
     ModelError
         Something in the file (a ``<compiler>`` option) gives the second model other masses than the first.
     """
-    spec = mujoco.MjSpec.from_string(text)
     model = spec.compile()
     for name in bodies:
         body, index = spec.body(name), model.body(name).id

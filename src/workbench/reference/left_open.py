@@ -50,7 +50,7 @@ def left_open(
 def _with_round_rods(reference: MujocoReference) -> mujoco.MjModel | None:
     """The model with every lopsided rod made round about its axis; None where there is none."""
     model, structure = reference.compiled(), reference.structure
-    spec = mujoco.MjSpec.from_string(reference.text)
+    spec = reference.spec()
     changed = False
     for rod in structure.rods:
         shape = RodFrame(model, rod, structure.frames)

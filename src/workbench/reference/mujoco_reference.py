@@ -31,7 +31,7 @@ from workbench.reference.platform_side import PlatformSide
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
 from workbench.reference.result import Mobility, ReferenceResult
-from workbench.reference.structure import Structure, read_structure
+from workbench.reference.structure import Structure, structure_of
 from workbench.reference.tolerance import few_digits_note, rank_of
 from workbench.robots.load import LoadedModel, load_model
 
@@ -73,9 +73,9 @@ class MujocoReference(PlatformSide):
     ) -> None:
         loaded = loaded or load_model(path, parameters, setup)
         self.file = loaded.file
-        self._text = loaded.text
+        self.loaded = loaded
         self._threads = threads
-        self._structure = read_structure(loaded.model, loaded.file)
+        self._structure = structure_of(loaded)
         self._engines = {"distributed": Engine(loaded.model, threads, self._structure.frames)}
         self._mass_layout = mass_layout(loaded.model)
         self._closer = LoopCloser(self._engines["distributed"], self._structure)
@@ -121,10 +121,9 @@ class MujocoReference(PlatformSide):
         """All velocities per actuated one, ``(n, nv, na)``; samples closed as `inverse_dynamics` does."""
         return self._assemble(q, ordered, near).tangent
 
-    @property
-    def text(self) -> str:
-        """The MJCF with the overrides written into it."""
-        return self._text
+    def spec(self) -> mujoco.MjSpec:
+        """A fresh specification of the model, to be changed and compiled."""
+        return self.loaded.spec()
 
     @property
     def structure(self) -> Structure:
@@ -305,7 +304,7 @@ class MujocoReference(PlatformSide):
                         file=self.file,
                     )
             self._engines[mass_model] = Engine(
-                without_bar_inertia(self._text, tuple(names.split()), self.file),
+                without_bar_inertia(self.spec(), tuple(names.split()), self.file),
                 self._threads,
                 self._structure.frames,
             )

@@ -21,7 +21,7 @@ from workbench.reference.kinds import CONNECT, SPIN, WELD
 from workbench.reference.pinocchio_limits import refuse_uncounted
 from workbench.reference.pinocchio_loops import PinocchioLoops
 from workbench.reference.pinocchio_reader import import_pinocchio, read, without_inertia
-from workbench.reference.structure import read_structure
+from workbench.reference.structure import structure_of
 from workbench.robots.load import LoadedModel, load_model
 
 MASS_MODELS = ("distributed", "lumped")
@@ -89,14 +89,14 @@ class PinocchioReference:
         loaded = loaded or load_model(path, parameters, setup)
         self.file = loaded.file
         self._compiled = loaded.model
-        structure = self._structure = read_structure(loaded.model, loaded.file)
+        structure = self._structure = structure_of(loaded)
         sites = {structure.platform_site}
         refuse_uncounted(loaded.model, structure)
         for kind, _, _, one, two in structure.blocks.tolist():
             sites |= {
                 point for point in (one, two) if kind in (CONNECT, WELD, SPIN) and 0 <= point < loaded.model.nsite
             }
-        self._reading = read(self._pin, loaded.text, loaded.model, sites, loaded.file, structure.frames)
+        self._reading = read(self._pin, _flat(loaded), loaded.model, sites, loaded.file, structure.frames)
         self._loops = PinocchioLoops(self._pin, self._reading, structure, loaded.model)
         self._models: dict[str, Any] = {"distributed": self._reading.model}
 
@@ -220,3 +220,8 @@ class PinocchioReference:
             sample=sample,
             value=q.tolist(),
         )
+
+
+def _flat(loaded: LoadedModel) -> str:
+    """The file's text with its includes in it; Pinocchio would look for them elsewhere."""
+    return loaded.prepared.source.text if loaded.prepared else loaded.text

@@ -243,7 +243,7 @@ class _Runner:
         """
         structure = self._reference.structure
         step = window / steps
-        model = near_rigid(self._reference.text, step, self._pull())
+        model = near_rigid(self._reference.spec(), step, self._pull())
         times = _times(self._start + 0.5 * step, step, steps)
         middle = self._motion_at(times)
         applied = np.zeros((len(torques) * len(factors), steps, model.nv))
@@ -296,19 +296,18 @@ def _times(first: float, step: float, count: int) -> FloatArray:
 
 
 @engine_warnings()
-def near_rigid(text: str, step: float, pull: tuple[str, FloatArray] | None = None) -> mujoco.MjModel:
+def near_rigid(spec: mujoco.MjSpec, step: float, pull: tuple[str, FloatArray] | None = None) -> mujoco.MjModel:
     """Compile an MJCF for forward simulation.
 
     Parameters
     ----------
-    text
-        The MJCF.
+    spec
+        A specification of its own, `MujocoReference.spec`.
     step
         Time step, s; loops and dry friction are as stiff as it allows.
     pull
         A site and a constant force on it ``(3,)``, N, world frame, which follows the site in every step.
     """
-    spec = mujoco.MjSpec.from_string(text)
     option = spec.option
     option.timestep = step
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST

@@ -12,13 +12,16 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.dry_friction import direction
+from workbench.errors import ModelError
 from workbench.mjcf.compile import custom_text
+from workbench.mjcf.lines import with_lines
 from workbench.mjcf.refusal import Refusal, joined
 from workbench.reference.closures import Block, Closures, fixed_tendons, name_of, read_closures
 from workbench.reference.frames import Frames
 from workbench.reference.kinds import CONNECT, JOINT, ROWS, SPIN, TENDON, WELD
 from workbench.reference.rods import ROUND, Rod, RodFrame, idle_rods, refuse_rod, spin_block
 from workbench.reference.uncovered import switched_off, uncovered
+from workbench.robots.load import LoadedModel
 
 __all__ = ["CONNECT", "JOINT", "ROWS", "SPIN", "TENDON", "WELD", "Structure", "read_structure", "refusals_of"]
 
@@ -118,6 +121,20 @@ def refusals_of(model: mujoco.MjModel) -> list[Refusal]:
     _, missing = _named(model, mujoco.mjtObj.mjOBJ_BODY, "base_body", "body")
     site, lost = _named(model, mujoco.mjtObj.mjOBJ_SITE, "platform_site", "site")
     return found + missing + lost + [r for _, r, _ in _judged(model, closures, site) if r is not None]
+
+
+def structure_of(loaded: LoadedModel) -> Structure:
+    """`read_structure` of a loaded file; what is refused stands on its line.
+
+    Raises
+    ------
+    ModelError
+        As `read_structure`.
+    """
+    try:
+        return read_structure(loaded.model, loaded.file)
+    except ModelError as error:
+        raise (with_lines(error, loaded.prepared.source) if loaded.prepared else error) from None
 
 
 def read_structure(model: mujoco.MjModel, file: str) -> Structure:

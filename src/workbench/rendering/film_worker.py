@@ -25,7 +25,7 @@ SHADOWS = 1024
 
 def film(folder: Path, width: int, height: int, columns: int) -> None:
     """Draw the poses in *folder*: the first one twice as large, all of them as one sheet of frames, row by row."""
-    model = mujoco.MjModel.from_xml_path(str(folder / MODEL))
+    model = mujoco.MjModel.from_binary_path(str(folder / MODEL))
     model.vis.quality.offsamples, model.vis.quality.shadowsize = 0, SHADOWS
     poses = np.load(folder / POSES)
     large = next(rendered(model, poses[:1], 2 * FINER * width, 2 * FINER * height))

@@ -54,7 +54,7 @@ def draw(poses: Poses, width: int, height: int, camera: str | None = None) -> It
     view = _camera(poses.model, camera)
     environment = {**os.environ, "MUJOCO_GL": offscreen_backend()}
     with tempfile.TemporaryDirectory(prefix="workbench_") as folder:
-        (Path(folder) / worker.MODEL).write_text(poses.text, encoding="utf-8")
+        mujoco.mj_saveModel(poses.model, str(Path(folder) / worker.MODEL))
         np.save(Path(folder) / worker.POSES, poses.qpos)
         command = [sys.executable, "-m", worker.__name__, folder, str(width), str(height), view]
         with (

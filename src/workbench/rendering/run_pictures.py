@@ -12,6 +12,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
@@ -52,7 +53,7 @@ class RunPictures:
         try:
             needs("OpenGL", "glfw", "PIL")
             self._folder = Path(tempfile.mkdtemp(prefix="workbench_"))
-            self._record = _write_poses(self._folder, result.model_text, result.qpos, result.series["t"])
+            self._record = _write_poses(self._folder, result.model, result.qpos, result.series["t"])
         except (MissingExtraError, OSError) as error:
             self._note = str(error)
             return
@@ -112,9 +113,9 @@ class RunPictures:
         self._note = f"no offscreen OpenGL on this machine (tried {', '.join(tried)})"
 
 
-def _write_poses(folder: Path, text: str, qpos: FloatArray, times: FloatArray) -> dict[str, Any]:
+def _write_poses(folder: Path, model: mujoco.MjModel, qpos: FloatArray, times: FloatArray) -> dict[str, Any]:
     kept = np.unique(np.linspace(0, len(qpos) - 1, FRAMES).round().astype(int))
-    (folder / MODEL).write_text(text, encoding="utf-8")
+    mujoco.mj_saveModel(model, str(folder / MODEL))
     np.save(folder / POSES, qpos[kept])
     return {
         "columns": COLUMNS,

@@ -125,7 +125,7 @@ def edit_file(
     wanted = described.table.changed(values, given)
     refuse_computed(base, given, values)
     refuse_impossible_bodies(base.model, described, loaded.file, values, wanted)
-    text = rewrite(base.model, loaded.source_text, loaded.file, described, values, wanted, base.elements)
+    text = rewrite(base.model, loaded.text, loaded.file, described, values, wanted, base.elements)
     edited = load_edited(base, text, wanted)
     accept(edited)
     _write(target, text, source)
@@ -135,7 +135,7 @@ def edit_file(
         for name, info in described.table.infos.items()
         if after[name] != values[name]
     )
-    return EditResult(source, target, moved, changed_lines(loaded.source_text, text), tuple(_stale(text, moved)))
+    return EditResult(source, target, moved, changed_lines(loaded.text, text), tuple(_stale(text, moved)))
 
 
 def _stale(text: str, moved: Sequence[Change]) -> Iterator[int]:
