@@ -21,7 +21,7 @@ MAX_LINES = 400
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("cli", "commands", "console"),
     ("report", "compare", "rendering"),
-    ("sweep",),
+    ("sweep", "diagnosis"),
     ("campaign", "workspace"),
     ("reference",),
     ("robots",),

@@ -15,18 +15,20 @@ from typing import TYPE_CHECKING, Any
 from workbench._version import __version__
 
 if TYPE_CHECKING:
+    from workbench.diagnosis.surface import diagnose
     from workbench.errors import WorkbenchError
     from workbench.reference import MujocoReference
     from workbench.report.frames import load_run
     from workbench.robots.load import load_mechanism
     from workbench.robots.registration import candidate
 
-__all__ = ["MujocoReference", "WorkbenchError", "__version__", "candidate", "load_mechanism", "load_run"]
+__all__ = ["MujocoReference", "WorkbenchError", "__version__", "candidate", "diagnose", "load_mechanism", "load_run"]
 
 _HOMES = {
     "MujocoReference": "workbench.reference",
     "WorkbenchError": "workbench.errors",
     "candidate": "workbench.robots.registration",
+    "diagnose": "workbench.diagnosis.surface",
     "load_mechanism": "workbench.robots.load",
     "load_run": "workbench.report.frames",
 }

@@ -13,6 +13,7 @@ import typer
 
 from workbench._version import __version__
 from workbench.commands.compare import compare
+from workbench.commands.diagnose import diagnose
 from workbench.commands.model import model
 from workbench.commands.new import new
 from workbench.commands.report import report
@@ -66,6 +67,7 @@ app.command()(status)
 app.command()(workspace)
 app.add_typer(model)
 app.command()(compare)
+app.command()(diagnose)
 app.command()(watch)
 
 
