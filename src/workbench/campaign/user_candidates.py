@@ -86,9 +86,9 @@ class UserCandidate:
         given = [_sealed(array) for array in ((q, qd, qdd, force) if self._with_force else (q, qd, qdd))]
         begun = time.perf_counter()
         try:
-            with _limit(LIMIT_S):
+            with limit(LIMIT_S):
                 found = self._function(mechanism.parameters, *given)
-        except _TooSlow as error:
+        except TooSlow as error:
             raise self._fault(f"takes more than {LIMIT_S:g} s for {len(q)} samples", error) from error
         except (Exception, SystemExit) as error:  # an exit code of theirs would be taken for the verdict
             raise self._fault(f"{type(error).__name__}: {error}", error) from error
@@ -121,19 +121,20 @@ class UserCandidate:
         return CandidateError(f'candidate "{self.name}" ({line}) {what}', candidate=self.name, line=line, **facts)
 
 
-class _TooSlow(BaseException):
+class TooSlow(BaseException):
     """Stops a user's function; no ``except Exception`` of theirs holds it up."""
 
 
 @contextmanager
-def _limit(seconds: float) -> Iterator[None]:
+def limit(seconds: float) -> Iterator[None]:
+    """Stop the code inside after some time, with `TooSlow`; where the system cannot, it goes on."""
     able = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread()
     if not able:
         yield
         return
 
     def stop(number: int, frame: object) -> None:
-        raise _TooSlow
+        raise TooSlow
 
     before = signal.signal(signal.SIGALRM, stop)
     signal.setitimer(signal.ITIMER_REAL, seconds)

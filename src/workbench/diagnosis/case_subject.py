@@ -89,7 +89,7 @@ class CaseSubject:
     def source(self) -> Source | None:
         """The user's file; formulas that come with the package are not edited."""
         if isinstance(self._function, UserCandidate):
-            return Source(self._function.file, self.candidate)
+            return Source(self._function.file.resolve(), self.candidate)
         return None
 
     @cached_property
@@ -174,9 +174,9 @@ class CaseSubject:
         return pins | dict(changes)
 
     def values(self, changes: Changes) -> Any:
-        """The parameters' values with changes, as a dict."""
+        """The parameters with changes; as a dict where their class is made for this robot and cannot be pickled."""
         parameters = self._changed(changes).parameters
-        return dataclasses.asdict(parameters)
+        return dataclasses.asdict(parameters) if self._generic else parameters
 
     def _changed(self, changes: Changes) -> Any:
         key = tuple(sorted(changes.items()))

@@ -48,8 +48,8 @@ class Suggestion:
     step: int = 1
     """mistakes are mended one after the other: first, second ..."""
     path: str = field(default="", repr=False)
-    edits: tuple[Any, ...] = field(default=(), repr=False)
-    """all edits up to and with this one, in the file's own places"""
+    text: str = field(default="", repr=False)
+    """the whole file with this edit and those of the steps before it"""
 
     @property
     def diff(self) -> str:
@@ -133,7 +133,7 @@ class Diagnosis:
                 for entry in self.entries
             ],
             "suggestions": [
-                {k: v for k, v in asdict(s).items() if k not in ("edits", "path")} | {"diff": s.diff}
+                {k: v for k, v in asdict(s).items() if k not in ("text", "path")} | {"diff": s.diff}
                 for s in self.suggestions
             ],
             "mend_notes": list(self.mend_notes),

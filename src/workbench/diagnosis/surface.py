@@ -149,7 +149,6 @@ def write_mended(diagnosis: Diagnosis, path: Path) -> None:
     OutputError
         The file is the formula's own, which is never written.
     """
-    from workbench.diagnosis.edits import apply_edits
     from workbench.errors import OutputError
     from workbench.sweep.files import write_bytes
 
@@ -158,4 +157,4 @@ def write_mended(diagnosis: Diagnosis, path: Path) -> None:
     source = Path(chosen.path)
     if path.exists() and path.samefile(source):
         raise OutputError(f"{path}: is the formula's own file; a mended copy has to have another name")
-    write_bytes(path, apply_edits(source.read_text(encoding="utf-8"), chosen.edits).encode())
+    write_bytes(path, chosen.text.encode())
