@@ -10,13 +10,22 @@ import ast
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-SIGN, FACTOR, TRIG, INDEX, NAME, PARAMETER, EXPONENT, QUOTIENT, DROP, NEGATE, SCALE, SWAP, SQUARE = range(13)
+SIGN, FACTOR, TRIG, INDEX, NAME, PARAMETER, EXPONENT, QUOTIENT, DROP, NEGATE, SCALE, SWAP, SQUARE, RARE_SCALE = range(
+    14
+)
 WHAT = (
     "sign of a term", "a factor", "sine for cosine", "an index", "a name", "a parameter", "an exponent",
     "numerator for denominator", "a term or factor too many", "a minus sign", "a factor in front",
-    "order of two arguments", "a missing square",
+    "order of two arguments", "a missing square", "a factor in front",
 )  # fmt: skip
 """Kinds of edits in words, most usual mistakes first: the order in which edits with the same effect are shown."""
+
+STAGES = (
+    frozenset({SIGN, FACTOR, TRIG, INDEX, NAME, PARAMETER, EXPONENT, QUOTIENT, DROP, SWAP}),
+    frozenset({NEGATE, SCALE}),
+    frozenset({SQUARE, RARE_SCALE}),
+)
+"""Kinds in the order in which they are tried: the next only where those before mend nothing wholly."""
 
 SHAPES = frozenset(
     {"zeros", "ones", "eye", "empty", "arange", "linspace", "reshape", "range", "len", "tile", "repeat", "swapaxes",
@@ -34,6 +43,12 @@ class Edit:
     new: str
     kind: int
     line: int
+
+    def place(self, text: str) -> tuple[int, int, int, str]:
+        """Line and columns (bytes), which an edit of another line does not move, and what is put there."""
+        data = text.encode()
+        begin = data.rfind(b"\n", 0, self.start) + 1
+        return data.count(b"\n", 0, self.start), self.start - begin, self.end - begin, self.new
 
     def apply(self, text: str) -> str:
         """Return the edited text."""
@@ -113,7 +128,7 @@ class _Walker:
         self.places, self.lines, self.indices = places, lines, indices
         self.groups = {name: tuple(others) for name, others in groups.items()}
         self.found: list[Edit] = []
-        self.names: list[set[str]] = [set()]
+        self.names: list[dict[str, int]] = [{}]
 
     def walk(self, tree: ast.Module) -> None:
         for statement in tree.body:
@@ -243,8 +258,10 @@ class _Walker:
         inner = f"({text})" if whole else text
         if not isinstance(node, ast.UnaryOp):
             self._replace(node, f"-{inner}", NEGATE)
-        for factor in ("2 * ", "0.5 * ", "4 * ", "0.25 * "):
+        for factor in ("2 * ", "0.5 * "):
             self._replace(node, f"{factor}{inner}", SCALE)
+        for factor in ("4 * ", "0.25 * "):
+            self._replace(node, f"{factor}{inner}", RARE_SCALE)
 
     def _constant(self, node: ast.Constant) -> None:
         value = node.value
@@ -257,8 +274,8 @@ class _Walker:
         for other in _swapped(node.id):
             if other in self.names[-1] or other in ("sin", "cos"):
                 self._replace(node, other, TRIG)
-        for other in sorted(self.names[-1]):
-            if other != node.id and alike(node.id, other):
+        for other, line in sorted(self.names[-1].items()):
+            if other != node.id and line < node.lineno and alike(node.id, other):
                 self._replace(node, other, NAME)
 
     def _attribute(self, node: ast.Attribute) -> None:
@@ -299,16 +316,17 @@ class _Walker:
                 if isinstance(argument, ast.List | ast.Tuple) or not isinstance(argument, ast.Constant):
                     self._expression(argument, node)
                 continue
-            self._term(argument)
+            if name not in ("sin", "cos"):
+                self._term(argument)
             self._expression(argument, node)
 
 
-def _bound(function: ast.FunctionDef) -> set[str]:
-    """Names that a function's own arguments and assignments bind."""
-    names = {argument.arg for argument in [*function.args.posonlyargs, *function.args.args]}
+def _bound(function: ast.FunctionDef) -> dict[str, int]:
+    """Names that a function's own arguments and assignments bind, and the line where each is first."""
+    names = {argument.arg: function.lineno for argument in [*function.args.posonlyargs, *function.args.args]}
     for node in ast.walk(function):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            names.add(node.id)
+            names[node.id] = min(names.get(node.id, node.lineno), node.lineno)
     return names
 
 
@@ -325,7 +343,7 @@ PAIRS = (("left", "right"), ("sin", "cos"), ("one", "two"), ("up", "down"))
 
 
 def alike(one: str, other: str) -> bool:
-    """Whether a name may have been written for another: one character apart, or its sibling by a usual pair of words."""
+    """Whether a name may have been written for another: one character apart, or its sibling by a pair of words."""
     for a, b in PAIRS:
         if one.replace(a, b) == other or one.replace(b, a) == other:
             return one != other

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.diagnosis.edits import WHAT, Edit, edits_of
+from workbench.diagnosis.edits import STAGES, WHAT, Edit, edits_of
 from workbench.diagnosis.examine import Examined
 from workbench.diagnosis.noise import SAFETY
 from workbench.diagnosis.parts import REST, Part, design, take_apart
-from workbench.diagnosis.probes import Plan
+from workbench.diagnosis.probes import Plan, ask
 from workbench.diagnosis.result import Suggestion
 from workbench.diagnosis.shares import reference_torques
 from workbench.diagnosis.subject import AFFINE, Parameter, Subject
@@ -32,8 +32,8 @@ from workbench.sweep.supervisor import Lost, Supervisor
 
 POSES = 4
 SHARE_POSES = 2
-BEAM = 5
-FULL = 120
+BEAM = 4
+FULL = 60
 """Edits that are looked at again with all parameters varied, for each step."""
 
 STEPS = 4
@@ -50,6 +50,16 @@ class Node:
     score: Score
     chain: tuple[tuple[Edit, str], ...] = ()
     """edits so far, each with the text that it was made on"""
+
+    @property
+    def edit(self) -> Edit:
+        """The last edit."""
+        return self.chain[-1][0]
+
+    @property
+    def lines(self) -> set[int]:
+        """Lines that were edited, from 0."""
+        return {edit.place(on)[0] for edit, on in self.chain}
 
 
 def search_mends(
@@ -92,6 +102,7 @@ class _Search:
     ) -> None:
         self._supervisor, self._deadline = supervisor, deadline
         self._lines, self._groups, self._joints = lines, groups, joints
+        self._moves: dict[tuple[int, int, int, str], np.ndarray] = {}
         self.tried = 0
 
     def run(self, text: str, path: str) -> tuple[list[Suggestion], tuple[str, ...]]:
@@ -99,55 +110,64 @@ class _Search:
         if started is None:
             return [], ("No edits are looked for: the file does not run in a worker.",)
         root = Node(text, started)
-        frontier, best = [root], root
-        others: dict[str, list[Node]] = {}
-        for _ in range(STEPS):
-            found = self._step(frontier)
-            if not found:
-                break
-            complete = [node for node in found if node.score.complete]
-            for node in found:
-                others.setdefault(node.chain[-1][1], []).append(node)
-            if complete:
-                best = complete[0]
-                break
-            frontier = _distinct(found)[:BEAM]
-            if frontier[0].score.right > best.score.right:
-                best = frontier[0]
-            if time.monotonic() > self._deadline:
-                break
+        best, waiting, others = root, [root], dict[str, list[Node]]()
+        while waiting and not best.score.complete and time.monotonic() < self._deadline:
+            # the best source first; one that led nowhere gives way to the next best
+            node = waiting.pop(0)
+            found = self._expand(node)
+            others[node.text] = found
+            if found and found[0].score.key > best.score.key:
+                best = found[0]
+            if len(node.chain) + 1 < STEPS:
+                gain = [n for n in _distinct(found) if n.score.key > node.score.key][:BEAM]
+                waiting = sorted([*waiting, *gain], key=lambda n: n.score.key, reverse=True)
         notes = [f"{self.tried} edits tried."]
         if time.monotonic() > self._deadline:
             notes.append("The time was up before all were; --time SECONDS gives more.")
-        if best is root or best.score.right <= root.score.right:
+        chain = _useful(root, best, others)
+        if not chain:
             return [], (*notes, "None of them brings a part to round-off.")
-        if not best.score.complete:
-            notes.append("These mend a part of it; what is left is not among the edits that are tried.")
-        return list(_suggestions(root, best, others, path)), tuple(notes)
+        if not chain[-1].score.complete:
+            notes.append("These mend a part of it; what is left is not among the edits that were tried.")
+        return list(_suggestions(root, chain, others, path)), tuple(notes)
 
-    def _step(self, frontier: Sequence[Node]) -> list[Node]:
-        """Score all edits of the frontier's sources, and the promising ones thoroughly; best first."""
-        made: dict[str, tuple[Node, Edit]] = {}
-        for node in frontier:
-            for edit in edits_of(node.text, self._lines, self._groups, self._joints):
-                made.setdefault(edit.apply(node.text), (node, edit))
-        texts = list(made)
-        cheap = self._scores(texts, 1)
-        ranked = [
-            (score, -made[text][1].kind, text) for text, score in zip(texts, cheap, strict=True) if score is not None
-        ]
-        ranked.sort(key=lambda item: (item[0].complete, item[0].key, item[1]), reverse=True)
-        kept = [text for score, _, text in ranked if score.complete]
-        kept += [text for score, _, text in ranked if not score.complete][:FULL]
-        full = self._scores(kept, None)
-        nodes = []
-        for text, score in zip(kept, full, strict=True):
-            if score is None:
+    def _expand(self, node: Node) -> list[Node]:
+        """Score all edits of a source, and the promising ones thoroughly; best first."""
+        made: dict[str, Edit] = {}
+        wrong = ~node.score.base
+        for edit in edits_of(node.text, self._lines, self._groups, self._joints):
+            place = edit.place(node.text)
+            moves = self._moves.get(place)
+            # a mend moves nothing that is right; what an edit moves was seen when it was tried first
+            if node.chain and moves is not None and place[0] not in node.lines and (moves & ~wrong).any():
                 continue
-            parent, edit = made[text]
-            nodes.append(Node(text, score, (*parent.chain, (edit, parent.text))))
-        nodes.sort(key=lambda node: (node.score.complete, node.score.key, -node.chain[-1][0].kind), reverse=True)
-        return nodes
+            made.setdefault(edit.apply(node.text), edit)
+        found: list[Node] = []
+        for stage in STAGES:
+            texts = [text for text, edit in made.items() if edit.kind in stage]
+            found += self._stage(node, texts, made)
+            if any(n.score.complete for n in found):
+                break
+        found.sort(key=lambda n: (n.score.complete, n.score.key, -n.edit.kind), reverse=True)
+        return found
+
+    def _stage(self, node: Node, texts: list[str], made: dict[str, Edit]) -> list[Node]:
+        cheap = self._scores(texts, 1)
+        ranked = []
+        for text, score in zip(texts, cheap, strict=True):
+            if score is not None:
+                ranked.append((score.base.sum(), score.total, -made[text].kind, text))
+                if not node.chain:
+                    self._moves[made[text].place(node.text)] = score.moved
+        ranked.sort(reverse=True)
+        whole = [item[3] for item in ranked if item[0] == node.score.base.size]
+        kept = whole + [item[3] for item in ranked if item[0] != node.score.base.size][:FULL]
+        full = self._scores(kept, None)
+        return [
+            Node(text, score, (*node.chain, (made[text], node.text)))
+            for text, score in zip(kept, full, strict=True)
+            if score is not None
+        ]
 
     def _scores(self, texts: Sequence[str], exams: int | None) -> list[Score | None]:
         """Score texts in the workers, until the time is up; None for those that fail or are not reached."""
@@ -175,16 +195,33 @@ def _distinct(nodes: Iterable[Node]) -> list[Node]:
     return kept
 
 
-def _suggestions(root: Node, best: Node, others: dict[str, list[Node]], path: str) -> Iterator[Suggestion]:
+def _useful(root: Node, best: Node, others: dict[str, list[Node]]) -> list[Node]:
+    """The way to the best source, as far as each of its steps ends with more entries right and none broken."""
+    chain, before = [], root
+    for edit, on in best.chain:
+        text = edit.apply(on)
+        node = next(n for n in others[on] if n.text == text)
+        chain.append(node)
+        before = node
+    while chain and not chain[-1].score.complete:
+        earlier = chain[-2] if len(chain) > 1 else root
+        now, then = chain[-1].score, earlier.score
+        if now.right > then.right and not (then.base & ~now.base).any():
+            break
+        chain.pop()
+    return chain if before is not root else []
+
+
+def _suggestions(root: Node, chain: list[Node], others: dict[str, list[Node]], path: str) -> Iterator[Suggestion]:
     """The way to the best source, and at each step the edits that do the same."""
     before = root.score
-    for step, (edit, on) in enumerate(best.chain, start=1):
-        after_text = edit.apply(on)
-        siblings = others.get(on, [])
-        mine = next((node for node in siblings if node.text == after_text), best)
-        alike = [mine, *(n for n in siblings if n.text != after_text and n.score.like(mine.score))]
-        alike = [n for n in alike if not mine.score.complete or n.score.complete]
-        alike.sort(key=lambda node: _rank(node.chain[-1][0]))
+    for step, mine in enumerate(chain, start=1):
+        siblings = others[mine.chain[-1][1]]
+        alike = [mine, *(n for n in siblings if n.text != mine.text and n.score.like(mine.score))]
+        alike = [n for n in alike if n.score.complete == mine.score.complete]
+        alike.sort(key=lambda node: _rank(node.edit))
+        if step < len(chain):  # the way goes on from this one
+            alike.sort(key=lambda node: node.text != mine.text)
         for node in alike[:MOST_MENDS]:
             yield _suggestion(node, before, step, path)
         before = mine.score
@@ -220,6 +257,7 @@ def make_paper(subject: Subject, seen: Examined) -> Paper:
     assert source is not None
     plan = seen.plan.at(POSES)
     splitting = splitting_of(plan, subject.takes_force)
+    start, _ = ask(plan, lambda q, qd, qdd, force: subject.formula(q, qd, qdd, force, {}))
     exams = [Exam(subject.values({}), plan.flat(), _parts(splitting, reference_torques(subject, plan, {})))]
     few = seen.plan.at(SHARE_POSES)
     changes = [{p.name: p.varied} for p in subject.parameters if p.read and p.kind in AFFINE]
@@ -232,7 +270,7 @@ def make_paper(subject: Subject, seen: Examined) -> Paper:
             continue
     return Paper(
         str(source.file), source.candidate, subject.takes_force, splitting, seen.floors, tuple(exams),
-        SAFETY * seen.noise,
+        _parts(splitting, start), len(seen.entries) // len(subject.joints), SAFETY * seen.noise,
     )  # fmt: skip
 
 

@@ -49,6 +49,10 @@ class Paper:
     """``(na,)`` the joints' largest parts"""
     exams: tuple[Exam, ...]
     """the robot as it is first, then with parameters changed one by one"""
+    start: FloatArray
+    """``(parts, poses, na)`` of the first exam by the formula as it is"""
+    named: int
+    """how many of the parts are parts; the others are states with everything at once"""
     noise: float
     """fraction of the floors that is noise of the formula's own"""
 
@@ -63,6 +67,8 @@ class Score:
     """minus the sum of the logarithms of the entries' errors"""
     base: np.ndarray
     """``(parts, na)`` which entries are right for the robot as it is"""
+    moved: np.ndarray
+    """``(parts, na)`` which are other than the unedited formula's"""
     complete: bool
     """all of them, in all exams"""
 
@@ -123,7 +129,8 @@ def score(paper: Paper, text: str, exams: int | None = None) -> Score | None:
             function = load_text(text, paper.path, paper.candidate)
     except (Exception, SystemExit, TooSlow):
         return None
-    right, total, base, complete = 0, 0.0, np.zeros(0), True
+    right, total, complete = 0, 0.0, True
+    base = moved = np.zeros(0, dtype=np.bool_)
     first: FloatArray | None = None
     for number, exam in enumerate(paper.exams[:exams]):
         found = torques_of(paper, function, exam)
@@ -142,7 +149,8 @@ def score(paper: Paper, text: str, exams: int | None = None) -> Score | None:
         complete = complete and bool(good.all())
         if number == 0:
             base = good
-    return Score(right, total, base, complete)
+            moved = ~(np.abs(found - paper.start).max(axis=1) <= NOTHING * paper.floors)
+    return Score(right, total, base, moved, complete)
 
 
 def _entries(paper: Paper, found: FloatArray, wanted: FloatArray, share: bool) -> tuple[np.ndarray, FloatArray]:
