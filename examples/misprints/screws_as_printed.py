@@ -41,7 +41,7 @@ def moved(screw, shift):
 def position(p, q):
     """P from the three limb lengths, eq. (7) to (9)."""
     Pz = (p.b**2 + q[:, 0] ** 2 - q[:, 2] ** 2) / (2 * p.b)
-    Py = -np.sqrt(q[:, 0] ** 2 - Pz**2)
+    Py = np.sqrt(q[:, 0] ** 2 - Pz**2)
     Px = np.sqrt(q[:, 1] ** 2 - (Py - p.h) ** 2)
     return np.stack([Px, Py, Pz], axis=1)
 

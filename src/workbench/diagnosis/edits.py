@@ -10,19 +10,19 @@ import ast
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-SIGN, FACTOR, TRIG, INDEX, NAME, PARAMETER, EXPONENT, QUOTIENT, DROP, NEGATE, SCALE, SWAP, SQUARE, RARE_SCALE = range(
-    14
-)
+SIGN, FACTOR, TRIG, INDEX, NAME, PARAMETER, EXPONENT, QUOTIENT, DROP = range(9)
+NEGATE, SCALE, SWAP, SQUARE, RARE_SCALE, INSERT = range(9, 15)
 WHAT = (
     "sign of a term", "a factor", "sine for cosine", "an index", "a name", "a parameter", "an exponent",
     "numerator for denominator", "a term or factor too many", "a minus sign", "a factor in front",
     "order of two arguments", "a missing square", "a factor in front",
+    "a term too few",
 )  # fmt: skip
 """Kinds of edits in words, most usual mistakes first: the order in which edits with the same effect are shown."""
 
 STAGES = (
     frozenset({SIGN, FACTOR, TRIG, INDEX, NAME, PARAMETER, EXPONENT, QUOTIENT, DROP, SWAP}),
-    frozenset({NEGATE, SCALE}),
+    frozenset({NEGATE, SCALE, INSERT}),
     frozenset({SQUARE, RARE_SCALE}),
 )
 """Kinds in the order in which they are tried: the next only where those before mend nothing wholly."""
@@ -94,7 +94,11 @@ class _Places:
 
 
 def edits_of(
-    text: str, lines: Iterable[int] | None, groups: Mapping[str, Iterable[str]], joints: int = 3
+    text: str,
+    lines: Iterable[int] | None,
+    groups: Mapping[str, Iterable[str]],
+    joints: int = 3,
+    missing: frozenset[str] = frozenset(),
 ) -> list[Edit]:
     """All small edits of a source text, most usual kinds first.
 
@@ -108,6 +112,8 @@ def edits_of(
         Parameter -> those of its kind, any of which might have been meant.
     joints
         Number of actuated joints; indices go up to it, and to three axes.
+    missing
+        Parameters that are missing somewhere: terms like those that there are, but with them, are put in.
 
     Raises
     ------
@@ -116,6 +122,7 @@ def edits_of(
     """
     tree = ast.parse(text)
     walker = _Walker(_Places(text.encode()), set(lines) if lines is not None else None, groups, max(3, joints))
+    walker.missing = missing
     walker.walk(tree)
     unique = {(e.start, e.end, e.new): e for e in sorted(walker.found, key=lambda e: -e.kind)}
     return sorted(unique.values(), key=lambda e: (e.kind, e.start, e.new))
@@ -128,6 +135,7 @@ class _Walker:
         self.places, self.lines, self.indices = places, lines, indices
         self.groups = {name: tuple(others) for name, others in groups.items()}
         self.found: list[Edit] = []
+        self.missing: frozenset[str] = frozenset()
         self.names: list[dict[str, int]] = [{}]
 
     def walk(self, tree: ast.Module) -> None:
@@ -210,6 +218,8 @@ class _Walker:
             self._add(at, after, "-" if isinstance(op, ast.Add) else "+", SIGN, node.right.lineno)
             self._add(start, end, left, DROP, node.lineno)
             self._add(start, end, right if isinstance(op, ast.Add) else f"-{right}", DROP, node.lineno)
+            for operand, sign in ((node.right, "+" if isinstance(op, ast.Add) else "-"), (node.left, "+")):
+                self._inserted(operand, sign, end)
             self._term(node.right)
             if not (isinstance(node.left, ast.BinOp) and isinstance(node.left.op, ast.Add | ast.Sub)):
                 self._term(node.left)
@@ -228,6 +238,33 @@ class _Walker:
             self._add(start, end, f"{right} @ {left}", SWAP, node.lineno)
         self._expression(node.left, node)
         self._expression(node.right, node)
+
+    def _inserted(self, node: ast.expr, sign: str, end: int) -> None:
+        """Put a copy of a term behind the sum, with a missing parameter in it, and with one name changed or none."""
+        if not self.missing or (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub)):
+            return
+        start = self.places.start(node)
+        text = self.places.text(start, self.places.end(node))
+        inside = [n for n in ast.walk(node) if isinstance(n, ast.Attribute) and n.attr in self.groups]
+        names = [n for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
+        for wanted in self.missing:
+            for attribute in inside:
+                if wanted != attribute.attr and wanted not in self.groups[attribute.attr]:
+                    continue
+                place = self.places.end(attribute) - len(attribute.attr) - start
+                changes: list[list[tuple[int, int, str]]] = [[(place, place + len(attribute.attr), wanted)]]
+                for name in names:
+                    at = self.places.start(name) - start
+                    changes += [
+                        [*changes[0], (at, at + len(name.id), other)]
+                        for other, line in self.names[-1].items()
+                        if other != name.id and line < node.lineno and alike(name.id, other)
+                    ]
+                for change in changes:
+                    copied = text.encode()
+                    for first, last, new in sorted(change, reverse=True):
+                        copied = copied[:first] + new.encode() + copied[last:]
+                    self._add(end, end, f" {sign} {copied.decode()}", INSERT, node.lineno)
 
     def _power(self, node: ast.BinOp, left: str, right: str) -> None:
         try:

@@ -85,7 +85,7 @@ def search_mends(
     groups = groups_of(subject.parameters)
     supervisor = Supervisor(jobs or _cores(), Setup(paper), 60.0, MEMORY_MB, 0)
     with closing(supervisor):
-        search = _Search(supervisor, deadline, lines, groups, len(subject.joints))
+        search = _Search(supervisor, deadline, lines, groups, len(subject.joints), missing_in(seen))
         try:
             return search.run(text, str(source.file))
         except WorkbenchError as error:
@@ -98,8 +98,15 @@ def _cores() -> int:
 
 class _Search:
     def __init__(
-        self, supervisor: Supervisor, deadline: float, lines: set[int] | None, groups: dict[str, list[str]], joints: int
+        self,
+        supervisor: Supervisor,
+        deadline: float,
+        lines: set[int] | None,
+        groups: dict[str, list[str]],
+        joints: int,
+        missing: frozenset[str],
     ) -> None:
+        self._missing = missing
         self._supervisor, self._deadline = supervisor, deadline
         self._lines, self._groups, self._joints = lines, groups, joints
         self._moves: dict[tuple[int, int, int, str], np.ndarray] = {}
@@ -135,7 +142,7 @@ class _Search:
         """Score all edits of a source, and the promising ones thoroughly; best first."""
         made: dict[str, Edit] = {}
         wrong = ~node.score.base
-        for edit in edits_of(node.text, self._lines, self._groups, self._joints):
+        for edit in edits_of(node.text, self._lines, self._groups, self._joints, self._missing):
             place = edit.place(node.text)
             moves = self._moves.get(place)
             # a mend moves nothing that is right; what an edit moves was seen when it was tried first
@@ -206,7 +213,7 @@ def _useful(root: Node, best: Node, others: dict[str, list[Node]]) -> list[Node]
     while chain and not chain[-1].score.complete:
         earlier = chain[-2] if len(chain) > 1 else root
         now, then = chain[-1].score, earlier.score
-        if now.right > then.right and not (then.base & ~now.base).any():
+        if now.right > then.right and not (then.mask & ~now.mask).any():
             break
         chain.pop()
     return chain if before is not root else []
@@ -309,6 +316,12 @@ def _linear(plan: Plan, tau: FloatArray, with_force: bool) -> dict[Part, FloatAr
 def groups_of(parameters: Sequence[Parameter]) -> dict[str, list[str]]:
     """Parameter -> those of the same unit: any of them might have been meant."""
     return {p.name: [o.name for o in parameters if o.unit == p.unit and o.name != p.name] for p in parameters}
+
+
+def missing_in(seen: Examined) -> frozenset[str]:
+    """Parameters that are missing from a part somewhere: a term with them may have been left out."""
+    shares = [share for share in seen.shares if any(entry.ratio == 0 for entry in share.wrong)]
+    return frozenset(share.parameter.name for share in shares)
 
 
 def lines_run(subject: Subject, plan: Plan) -> set[int] | None:

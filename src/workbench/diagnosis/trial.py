@@ -67,6 +67,8 @@ class Score:
     """minus the sum of the logarithms of the entries' errors"""
     base: np.ndarray
     """``(parts, na)`` which entries are right for the robot as it is"""
+    mask: np.ndarray
+    """the same for all exams in a row"""
     moved: np.ndarray
     """``(parts, na)`` which are other than the unedited formula's"""
     complete: bool
@@ -131,6 +133,7 @@ def score(paper: Paper, text: str, exams: int | None = None) -> Score | None:
         return None
     right, total, complete = 0, 0.0, True
     base = moved = np.zeros(0, dtype=np.bool_)
+    masks = []
     first: FloatArray | None = None
     for number, exam in enumerate(paper.exams[:exams]):
         found = torques_of(paper, function, exam)
@@ -144,13 +147,14 @@ def score(paper: Paper, text: str, exams: int | None = None) -> Score | None:
             poses = found.shape[1]
             found, wanted = found - first[:, :poses], wanted - paper.exams[0].parts[:, :poses]
         good, logs = _entries(paper, found, wanted, number > 0)
+        masks.append(good.ravel())
         right += int(good.sum())
         total -= float(logs.sum())
         complete = complete and bool(good.all())
         if number == 0:
             base = good
             moved = ~(np.abs(found - paper.start).max(axis=1) <= NOTHING * paper.floors)
-    return Score(right, total, base, moved, complete)
+    return Score(right, total, base, np.concatenate(masks), moved, complete)
 
 
 def _entries(paper: Paper, found: FloatArray, wanted: FloatArray, share: bool) -> tuple[np.ndarray, FloatArray]:
