@@ -16,13 +16,23 @@ from workbench._version import __version__
 
 if TYPE_CHECKING:
     from workbench.diagnosis.surface import diagnose
+    from workbench.diagnosis.terms_frame import terms
     from workbench.errors import WorkbenchError
     from workbench.reference import MujocoReference
     from workbench.report.frames import load_run
     from workbench.robots.load import load_mechanism
     from workbench.robots.registration import candidate
 
-__all__ = ["MujocoReference", "WorkbenchError", "__version__", "candidate", "diagnose", "load_mechanism", "load_run"]
+__all__ = [
+    "MujocoReference",
+    "WorkbenchError",
+    "__version__",
+    "candidate",
+    "diagnose",
+    "load_mechanism",
+    "load_run",
+    "terms",
+]
 
 _HOMES = {
     "MujocoReference": "workbench.reference",
@@ -31,6 +41,7 @@ _HOMES = {
     "diagnose": "workbench.diagnosis.surface",
     "load_mechanism": "workbench.robots.load",
     "load_run": "workbench.report.frames",
+    "terms": "workbench.diagnosis.terms_frame",
 }
 
 

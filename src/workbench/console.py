@@ -111,8 +111,20 @@ def print_outcome(outcome: Outcome) -> None:
     for claim in refuted:
         measured, claimed = _quantity(claim["measured"], claim["unit"]), _quantity(claim["claimed"], claim["unit"])
         out.print(Text(f"  not confirmed: {claim['text']}: measured {measured}, printed {claimed} ({claim['source']})"))
+    _print_diagnosis(manifest.get("diagnosis", {}))
     out.print(_verdict(outcome))
     out.print(Text(f"Report: {outcome.directory / 'report.html'}"), soft_wrap=True)
+
+
+def _print_diagnosis(diagnosis: dict[str, Any]) -> None:
+    """Say of each failing formula what is wrong with it, and the command that says more."""
+    for candidate, found in diagnosis.items():
+        if not found["findings"]:
+            continue
+        out.print(Text(f'What is wrong with "{candidate}":', style="bold"))
+        for sentence in found["findings"]:
+            out.print(Text(f"  - {sentence}"))
+        out.print(Text(f"  {found['command']}", style="dim"), soft_wrap=True)
 
 
 def _verdict(outcome: Outcome) -> Text:

@@ -101,6 +101,7 @@ def run(
             typer.echo(f"workbench: {stop}", err=True)
             raise
     else:
+        from workbench.diagnosis.brief import brief
         from workbench.rendering.run_pictures import RunPictures
         from workbench.report import build_report
 
@@ -119,6 +120,7 @@ def run(
                 effort=effort,
                 candidates=candidates or (),
                 pick=pick_cases,
+                explain=brief,
             )
         print_outcome(outcome)
         passed = outcome.passed

@@ -69,7 +69,7 @@ def examine(
     shares: list[Share] = []
     few = plan.at(SHARE_POSES)
     mine, theirs = ({part: tau[:SHARE_POSES] for part, tau in parts.items()} for parts in (formula, reference))
-    if parameters and noise == 0.0 and not subject.reference({}).excess_actuators:
+    if parameters and noise == 0.0 and not failures and not subject.reference({}).excess_actuators:
         wrong = any(entry.status == WRONG_MARK for entry in entries)
         refused = []
         for parameter in subject.parameters:
@@ -82,6 +82,8 @@ def examine(
                 shares.append(share)
         if refused:
             notes.append(f"parameter {list_of(refused)}: one of the sides refuses another value")
+    elif parameters and failures:
+        notes.append("parameters one by one: the formula fails on some states as it is")
     elif parameters and noise:
         notes.append("parameters one by one: the formula's numbers are too noisy for differences of torques")
     if parameters and subject.no_parameters:
@@ -110,13 +112,14 @@ def diagnose_subject(subject: Subject) -> tuple[Diagnosis, Examined]:
             f"errors below {percent(SAFETY * seen.noise)} of a joint's largest part: the formula's own numbers are"
             f" noisy by {seen.noise:.0e} (single precision, finite differences, or an iteration that ends early)"
         )
-    findings += _about_terms(subject, seen, notes)
+    findings += about_terms(subject, seen, notes)
     if not [finding for finding in findings if finding.kind != FAILURE] and not seen.noise:
         findings += _other_numbers(subject, seen, notes)
     return _made(subject, seen, findings, notes, begun), seen
 
 
-def _about_terms(subject: Subject, seen: Examined, notes: list[str]) -> list[Finding]:
+def about_terms(subject: Subject, seen: Examined, notes: list[str], structure: bool = True) -> list[Finding]:
+    """Put what was measured into findings about terms, most telling first."""
     joints = subject.joints
     findings: list[Finding] = []
     wrong = [entry for entry in seen.entries if entry.status == WRONG_MARK]
@@ -147,7 +150,8 @@ def _about_terms(subject: Subject, seen: Examined, notes: list[str]) -> list[Fin
     if len(dynamic) > MOST_NAMED:
         notes.append(f"{len(dynamic) - MOST_NAMED} more entries that are wrong: see the table")
     findings += plain_findings(seen.entries, joints, jacobian is not None)
-    findings += structure_findings(subject, seen.plan, seen.formula, seen.noise)
+    if structure:
+        findings += structure_findings(subject, seen.plan, seen.formula, seen.noise)
     if not findings:
         findings.append(_unnamed(wrong, joints))
     return findings

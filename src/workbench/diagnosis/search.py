@@ -36,7 +36,7 @@ BEAM = 4
 FULL = 60
 """Edits that are looked at again with all parameters varied, for each step."""
 
-STEPS = 4
+STEPS = 6
 BATCH = 12
 MEMORY_MB = 2000.0
 MOST_MENDS = 12

@@ -181,6 +181,14 @@ class DrawingRecord(Record):
     up: tuple[float, float, float]
 
 
+class SpentRecord(Record):
+    """What a case's torques are spent on: root mean squares, N or N m, by part and by body, joint by joint."""
+
+    mass_model: str = ""
+    parts: dict[str, dict[str, float | None]] = {}
+    bodies: dict[str, dict[str, float | None]] = {}
+
+
 class CaseRecord(Record):
     """One case: its status and the scalar evidence about mechanism and reference. Missing evidence is None."""
 
@@ -212,7 +220,17 @@ class CaseRecord(Record):
     solutions_at_start: tuple[tuple[float | None, ...], ...] = ()
     evidence: EvidenceRecord = EvidenceRecord()
     drawing: DrawingRecord | None = None
+    spent: SpentRecord = SpentRecord()
     warnings: tuple[str, ...] = ()
+
+
+class DiagnosisRecord(Record):
+    """What is wrong with a formula that fails its verification, in a few sentences."""
+
+    reference: str = ""
+    findings: tuple[str, ...] = ()
+    command: str = ""
+    """``workbench diagnose ...``, which says more"""
 
 
 class SweepRecord(Record):
@@ -253,6 +271,7 @@ class Manifest(Record):
     claims: tuple[ClaimRecord, ...] = ()
     figures: tuple[FigureRecord, ...] = ()
     cases: dict[str, CaseRecord]
+    diagnosis: dict[str, DiagnosisRecord] = {}
     sweep: SweepRecord | None = None
 
     def unit_of(self, joint: str) -> str:
