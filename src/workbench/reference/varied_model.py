@@ -102,8 +102,7 @@ def varied_reference(
                 if scale_inertia and body not in named_inertia:
                     inertias[body] *= factor
             else:
-                others = {AXES.index(p.axis) for p in places.values() if p.kind == "inertia" and p != place}
-                inertias[body] = _turned(model, body, AXES.index(place.axis), value, inertias[body], others)
+                inertias[body] = _turned(model, place, places, body, value, inertias[body])
     for body in range(1, model.nbody):
         element = spec.body(model.body(body).name)
         if element is None:
@@ -138,30 +137,31 @@ def _same(one: float, other: float) -> bool:
     return bool(abs(one - other) <= ALIKE * max(abs(one), abs(other)))
 
 
-def _inertia(model: mujoco.MjModel, body: int, axis: int) -> float:
+def _moment(model: mujoco.MjModel, place: Place) -> float:
+    """Moment of inertia of the named body about the named axis of its own frame."""
     turn = np.zeros(9)
+    body = model.body(place.element).id
     mujoco.mju_quat2Mat(turn, model.body_iquat[body])
-    return float(turn.reshape(3, 3)[axis] ** 2 @ model.body_inertia[body])
+    return float(turn.reshape(3, 3)[AXES.index(place.axis)] ** 2 @ model.body_inertia[body])
 
 
 def _turned(
-    model: mujoco.MjModel, body: int, axis: int, value: float, principal: np.ndarray, others: set[int]
+    model: mujoco.MjModel, place: Place, places: Mapping[str, Place], body: int, value: float, principal: np.ndarray
 ) -> np.ndarray:
-    """Principal inertias with the moment about a body axis moved to *value*.
+    """Principal inertias with those that equal the named moment moved to *value*.
 
-    Transverse twins of a rod move along; where no body has such moments, so do all that no parameter names (*others*).
+    Transverse twins of a rod move along; where no body has such moments, so do all that no other parameter names.
     """
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.body_iquat[body])
-    share = turn.reshape(3, 3)[axis] ** 2
-    main = int(np.argmax(share))
-    twins = [i for i in range(3) if _same(principal[i], principal[main])]
-    factor = value / float(share @ principal)
-    moved = principal.copy()
-    moved[twins] *= factor
-    if 2 * moved.max() > moved.sum():
-        named = {int(np.argmax(turn.reshape(3, 3)[other] ** 2)) for other in others} - {main}
-        moved = np.array([v if i in named else v * factor for i, v in enumerate(principal)])
+    before = _moment(model, place)
+    mine = np.array([_same(moment, before) for moment in model.body_inertia[body]])
+    if not mine.any():
+        raise ParameterError(f"inertia {place.element} {place.axis}: no principal axis of the body")
+    factor = value / before
+    moved = np.where(mine, principal * factor, principal)
+    if 2 * moved.max() > moved.sum() * (1 + 1e-12):
+        others = [_moment(model, p) for p in places.values() if p.kind == "inertia" and p != place]
+        named = np.array([any(_same(m, other) for other in others) for m in model.body_inertia[body]]) & ~mine
+        moved = np.where(named, principal, principal * factor)
     return moved
 
 
@@ -169,16 +169,17 @@ def _alike(model: mujoco.MjModel, place: Place, taken: set[tuple[str, str, str]]
     """Bodies that hold the same number in the same kind of place, those that others name left out."""
     named = model.body(place.element).id
 
-    def number(body: int) -> float:
+    def numbers(body: int) -> np.ndarray:
         if place.kind == "mass":
-            return float(model.body_mass[body])
-        return _inertia(model, body, AXES.index(place.axis))
+            return np.array([model.body_mass[body]])
+        return np.sort(model.body_inertia[body])
 
+    wanted = numbers(named)
     found = [named]
     for body in range(1, model.nbody):
         name = model.body(body).name
         if body == named or (taken and (place.kind, name, place.axis) in taken):
             continue
-        if number(body) > 1e-9 and _same(number(body), number(named)):
+        if wanted.max() > 1e-9 and np.allclose(numbers(body), wanted, rtol=ALIKE, atol=0.0):
             found.append(body)
     return found
