@@ -95,7 +95,7 @@ class Bench:
         self.campaign, self.path, self.candidate, self.rng = campaign, path, candidate, rng
         self.text = path.read_text()
         self.subject = subjects(campaign, candidates=[path], candidate=candidate)[0]
-        self.plan = make_plan(self.subject, choose_poses(self.subject, 8))
+        self.plan = make_plan(self.subject, choose_poses(self.subject))
         self.parameters = [p for p in self.subject.parameters if p.read and p.kind in ("mass", "inertia")]
         self.right = {None: parts_at(self.subject, self.plan, {})}
         for p in self.parameters:

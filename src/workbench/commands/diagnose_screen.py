@@ -38,20 +38,22 @@ def _print_findings(diagnosis: Diagnosis, searching: bool) -> None:
         out.print(text)
     out.print()
     if not diagnosis.right:
-        out.print(_table(diagnosis))
+        table, right = _table(diagnosis)
+        out.print(Text("The torque part by part: formula against reference", style="bold"))
+        out.print(table)
+        if right:
+            out.print(Text(f"Other parts: {right}, right in every joint to {diagnosis.digits} digits or better."))
     for note in diagnosis.not_covered:
         out.print(Text(f"Not looked at: {note}.", style="dim"))
-    if searching and not diagnosis.right:
+    if searching and not diagnosis.right and out.is_terminal:
         out.print(
             Text(f"({diagnosis.seconds.get('findings', 0):.1f} s) Looking for edits that mend it ...", style="dim")
         )
 
 
-def _table(diagnosis: Diagnosis) -> Table:
-    table = Table(
-        title="The torque part by part: formula against reference", title_justify="left", box=box.SIMPLE_HEAD,
-        title_style="bold",
-    )  # fmt: skip
+def _table(diagnosis: Diagnosis) -> tuple[Table, int]:
+    """The parts that are not right in every joint, and how many others there are."""
+    table = Table(box=box.SIMPLE_HEAD)
     table.add_column("part")
     for joint in diagnosis.joints:
         table.add_column(f"tau_{joint}")
@@ -65,10 +67,7 @@ def _table(diagnosis: Diagnosis) -> Table:
             style = "bold red" if mark.startswith(("WRONG", "there")) else "green" if mark else "dim"
             cells.append(Text(mark or "-", style=style))
         table.add_row(*cells)
-    if right:
-        table.caption = f"{right} other part(s): right in every joint, to {diagnosis.digits} digits or better."
-        table.caption_justify = "left"
-    return table
+    return table, right
 
 
 def _print_mends(diagnosis: Diagnosis) -> None:
