@@ -68,7 +68,7 @@ def examine(
     plan = make_plan(subject, choose_poses(subject, *([poses] if poses else [])))
     formula, reference, failures = both_sides(subject, plan, {})
     notes: list[str] = []
-    whole = failures and np.all([np.isfinite(tau).all(axis=1) for tau in formula.values()], axis=0)
+    whole = np.all([np.isfinite(tau).all(axis=1) for tau in formula.values()], axis=0)
     if failures and FEWEST_POSES <= whole.sum() < len(whole):
         # a formula that fails at some poses, outside of a root's range for instance, is looked at where it answers
         notes.append(f"{(~whole).sum()} of {len(whole)} poses, at which the formula fails")
