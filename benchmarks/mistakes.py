@@ -154,12 +154,8 @@ class Bench:
             path.write_text(text)
             try:
                 users = load_candidates([path])
-                from workbench.campaign.user_candidates import offer
-
                 case = self.subject.case
-                own = {k: v for k, v in case.mechanism.candidates.items() if k != self.candidate}
-                vars(case.mechanism)["candidates"] = own
-                offer(case.mechanism, [u for u in users if u.name == self.candidate])
+                case.robot.offer({u.name: u.as_candidate() for u in users if u.name == self.candidate})
                 subject = type(self.subject)(case, self.candidate, self.subject.mass_model, self.subject._others)
                 subject.__dict__["motion"] = self.subject.motion
                 subject._references = self.subject._references

@@ -73,7 +73,7 @@ def planar(repository: Path) -> wb.MujocoReference:
 
 
 @pytest.fixture(scope="module")
-def closed_form(repository: Path) -> wb.Mechanism:
+def closed_form(repository: Path) -> wb.Robot:
     return wb.load_mechanism(repository / "models" / "asym_2rss_ppap.xml")
 
 
@@ -182,7 +182,7 @@ def test_steps_are_shortened_at_the_edge_of_the_workspace(planar: wb.MujocoRefer
 # forward replay
 
 
-def torques_of(mechanism: wb.Mechanism, **factors: float) -> dict[str, replay.TorqueAt]:
+def torques_of(mechanism: wb.Robot, **factors: float) -> dict[str, replay.TorqueAt]:
     named: dict[str, replay.TorqueAt] = {
         name: lambda q, qd, qdd, name=name: mechanism.inverse_dynamics(q, qd, qdd, name)
         for name in ("distributed", "lumped")
@@ -192,7 +192,7 @@ def torques_of(mechanism: wb.Mechanism, **factors: float) -> dict[str, replay.To
     return named
 
 
-def test_replay_of_simulation_2(asym: wb.MujocoReference, closed_form: wb.Mechanism) -> None:
+def test_replay_of_simulation_2(asym: wb.MujocoReference, closed_form: wb.Robot) -> None:
     found = replay.replay(asym, at(SIMULATION_2), torques_of(closed_form, off=1.01), 0.0, 1.0)
     assert found.limited_by == ""
     right, lumped = found.replays["distributed"], found.replays["lumped"]

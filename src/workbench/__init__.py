@@ -15,21 +15,24 @@ from typing import TYPE_CHECKING, Any
 from workbench._version import __version__
 
 if TYPE_CHECKING:
+    from workbench.capabilities.robot import Robot, load_robot
+    from workbench.capabilities.robot import load_robot as load_mechanism
     from workbench.diagnosis.surface import diagnose
     from workbench.diagnosis.terms_frame import terms
     from workbench.errors import WorkbenchError
     from workbench.reference import MujocoReference
     from workbench.report.frames import load_run
-    from workbench.robots.load import load_mechanism
     from workbench.robots.registration import candidate
 
 __all__ = [
     "MujocoReference",
+    "Robot",
     "WorkbenchError",
     "__version__",
     "candidate",
     "diagnose",
     "load_mechanism",
+    "load_robot",
     "load_run",
     "terms",
 ]
@@ -39,7 +42,9 @@ _HOMES = {
     "WorkbenchError": "workbench.errors",
     "candidate": "workbench.robots.registration",
     "diagnose": "workbench.diagnosis.surface",
-    "load_mechanism": "workbench.robots.load",
+    "load_mechanism": "workbench.capabilities.robot:load_robot",
+    "load_robot": "workbench.capabilities.robot",
+    "Robot": "workbench.capabilities.robot",
     "load_run": "workbench.report.frames",
     "terms": "workbench.diagnosis.terms_frame",
 }
@@ -48,7 +53,8 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first asked for."""
     if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
+        module, _, called = _HOMES[name].partition(":")
+        return getattr(import_module(module), called or name)
     raise AttributeError(f"module 'workbench' has no attribute {name!r}")
 
 

@@ -13,6 +13,7 @@ from workbench.arrays import FloatArray
 from workbench.campaign.candidate_spec import CandidateSpec
 from workbench.campaign.cases import Case, at_time
 from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
+from workbench.campaign.platform import Platform, platform_of
 from workbench.campaign.spec import Campaign
 from workbench.campaign.spent import spent_on
 from workbench.campaign.torques import Fault, torques_of
@@ -38,7 +39,7 @@ KINEMATICS_BOUND = 1e-11
 rounding, with two digits to spare near singular poses."""
 
 OTHER_BRANCH = 1e-6
-"""Metres; a platform farther than this from the closed form's is another pose of the mechanism, not rounding."""
+"""Metres; a platform farther than this from the closed form's is another pose of the robot, not rounding."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,8 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     ModelError
         The model's platform is somewhere else than the closed form's.
     """
-    motion, mechanism = case.motion, case.mechanism
-    reference = MujocoReference(case.model, threads=1, loaded=case.loaded, setup=case.setup, **case.overrides)
+    motion, robot = case.motion, case.robot
+    reference = case.robot.reference
     results: dict[str, ReferenceResult] = {}
     series = _motion_columns(case)
     try:
@@ -104,7 +105,10 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         torques = computed.torques
     except MotionError as error:
         raise at_time(error, motion.t) from error
-    _refuse_other_branch(case, next(iter(results.values())).x)
+    platform = platform_of(case, next(iter(results.values())))
+    series |= platform.columns()
+    if robot.closed_kinematics:  # else the case's platform motion is the reference's own
+        _refuse_other_branch(case, platform.task[0])
     sound = [name for name in torques if name not in computed.faults]
     evidence = gather_evidence(case, reference, results, sound, effort)
     rows = [
@@ -116,15 +120,15 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     if effort.budget:
         rows += _raw_rows(case, reference, results, evidence)
     for mass_model, result in results.items():
-        series |= _columns(f"ref_{mass_model}", result.tau, mechanism.joints)
+        series |= _columns(f"ref_{mass_model}", result.tau, robot.joints)
     for name in sound:
         tau = torques[name]
-        series |= _columns(f"cand_{name}", tau, mechanism.joints)
+        series |= _columns(f"cand_{name}", tau, robot.joints)
     first = next(iter(results.values()))
     for joint, force in first.reactions.items():
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual
-    facts = _facts(case, reference, first, rows) | {"evidence": evidence.facts()}
+    facts = _facts(case, reference, first, rows, platform) | {"evidence": evidence.facts()}
     if effort.drawing:
         drawing = skeleton(reference, first.qpos)
         for point, place in drawing.points.items():
@@ -140,7 +144,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
 
 
 def _refuse_other_branch(case: Case, x: FloatArray) -> None:
-    """Refuse a model whose platform ``(n, 3)`` is elsewhere: torques on another assembly branch compare nothing."""
+    """Refuse a model whose platform ``(n, m)`` is elsewhere: torques on another assembly branch compare nothing."""
     gaps = np.linalg.norm(case.x - x, axis=1)
     worst = int(gaps.argmax())
     if gaps[worst] > OTHER_BRANCH:
@@ -170,7 +174,7 @@ def _rows(
 ) -> list[Row]:
     rows = []
     reaction = largest_reaction(reference.reactions.values())
-    for i, joint in enumerate(case.mechanism.joints):
+    for i, joint in enumerate(case.robot.joints):
         error = joint_error(tau[:, i], reference.tau[:, i], reaction)
         uncertainty = evidence.uncertainty(candidate.reference, joint)
         judged = candidate.in_case(case.spec, joint)
@@ -187,7 +191,7 @@ def _rows(
                 bound=judged.bound,
                 verdict=verdict_of(judged, case.name, joint, error.peak_error, uncertainty),
                 kind=kind_of(candidate),
-                unit=case.mechanism.force_units[i],
+                unit=case.robot.force_units[i],
                 peak_reference=error.peak_reference,
                 pointwise_skipped=error.pointwise_skipped,
                 normaliser=normaliser_of(error, reaction),
@@ -208,23 +212,23 @@ def _motion_columns(case: Case) -> dict[str, FloatArray]:
     columns: dict[str, FloatArray] = {"t": motion.t}
     for prefix, values in (("q", motion.q), ("qd", motion.qd), ("qdd", motion.qdd)):
         columns |= {f"{prefix}{i + 1}": values[:, i] for i in range(values.shape[1])}
-    for prefix, values in (("x", case.x), ("xd", case.xd), ("xdd", case.xdd)):
-        columns |= {f"{prefix}{i + 1}": values[:, i] for i in range(3)}
     return columns
 
 
-def _facts(case: Case, reference: MujocoReference, result: ReferenceResult, rows: list[Row]) -> dict[str, Any]:
+def _facts(
+    case: Case, reference: MujocoReference, result: ReferenceResult, rows: list[Row], platform: Platform
+) -> dict[str, Any]:
     t = case.motion.t
     mobility = reference.mobility()
     speed = np.linalg.norm(result.xd, axis=1)
     acceleration = np.linalg.norm(result.xdd, axis=1)
-    measures = case.mechanism.singularity_measures(case.motion.q)
+    measures = case.robot.singularity_measures(case.motion.q)
     kinematics = {}
-    if case.mechanism.closed_kinematics:  # else case.x is the reference's own
+    if case.robot.closed_kinematics:  # else case.x is the reference's own
         kinematics = {
-            "position": _apart(case.x, result.x),
-            "velocity": _apart(case.xd, result.xd),
-            "acceleration": _apart(case.xdd, result.xdd),
+            "position": platform.apart(0),
+            "velocity": platform.apart(1),
+            "acceleration": platform.apart(2),
         }
     apart = [f"{name} by {error:.2g}" for name, error in kinematics.items() if not error <= KINEMATICS_BOUND]
     message = f"platform {', '.join(apart)} of its peak (allowed: {KINEMATICS_BOUND:g})" if apart else None
@@ -257,17 +261,8 @@ def _facts(case: Case, reference: MujocoReference, result: ReferenceResult, rows
             for name, v in measures.items()
         },
         "kinematics": kinematics,
-        "conditions": [dataclasses.asdict(c) for c in case.mechanism.paper_conditions(case.motion.q)],
-        "solutions_at_start": case.mechanism.assembly_solutions(case.motion.q[:1])[0].tolist(),
+        "conditions": [dataclasses.asdict(c) for c in case.robot.conditions(case.motion.q)],
+        "solutions_at_start": case.robot.assembly_solutions(case.motion.q[:1])[0].tolist(),
         "peak_reactions": {name: float(np.linalg.norm(f, axis=1).max()) for name, f in result.reactions.items()},
-        "warnings": case.mechanism.warnings(case.motion.t, case.motion.q, case.motion.qd),
+        "warnings": case.robot.warnings(case.motion.t, case.motion.q, case.motion.qd),
     }
-
-
-def _apart(candidate: FloatArray, reference: FloatArray) -> float:
-    """Largest distance over the largest magnitude; 0 where both vanish."""
-    distance = float(np.linalg.norm(candidate - reference, axis=1).max())
-    magnitude = float(np.linalg.norm(reference, axis=1).max())
-    if magnitude == 0.0:
-        return 0.0 if distance == 0.0 else float("inf")
-    return distance / magnitude

@@ -15,7 +15,6 @@ import sys
 import threading
 import time
 import traceback
-from collections import ChainMap
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib.machinery import SourceFileLoader
@@ -28,11 +27,12 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.campaign.candidate_spec import CandidateSpec
-from workbench.campaign.schema import NAME, NAME_RULE
 from workbench.campaign.spec import Campaign
+from workbench.capabilities.robot import Robot
 from workbench.errors import CandidateError, SpecError, did_you_mean
-from workbench.robots.base import Candidate, Mechanism
+from workbench.robots.closed_form import Candidate
 from workbench.robots.registration import MARK, Registration
+from workbench.schema import NAME, NAME_RULE
 
 LIMIT_S = 60.0
 """Longest time that one call may take before it is stopped, where the system can (not in threads, not on Windows)."""
@@ -69,13 +69,11 @@ class UserCandidate:
         return statistics.median(self._taken) if self._taken else float("nan")
 
     def as_candidate(self) -> Candidate:
-        """The same as a candidate of a mechanism."""
+        """The same as a candidate of a robot."""
         about = self.registration
         return Candidate(self.name, about.reference, self, about.description, about.source or self.where)
 
-    def __call__(
-        self, mechanism: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray
-    ) -> FloatArray:
+    def __call__(self, robot: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> FloatArray:
         """Call the function.
 
         Raises
@@ -87,13 +85,13 @@ class UserCandidate:
         begun = time.perf_counter()
         try:
             with limit(LIMIT_S):
-                found = self._function(mechanism.parameters, *given)
+                found = self._function(robot.parameters, *given)
         except TooSlow as error:
             raise self._fault(f"takes more than {LIMIT_S:g} s for {len(q)} samples", error) from error
         except (Exception, SystemExit) as error:  # an exit code of theirs would be taken for the verdict
             raise self._fault(f"{type(error).__name__}: {error}", error) from error
         self._taken.append((time.perf_counter() - begun) / max(len(q), 1))
-        return self._checked(found, q.shape, mechanism.joints)
+        return self._checked(found, q.shape, robot.joints)
 
     def _checked(self, found: Any, shape: tuple[int, ...], joints: tuple[str, ...]) -> FloatArray:
         if np.iscomplexobj(found):
@@ -256,31 +254,21 @@ def _run(name: str, load: Any) -> ModuleType:
     return module
 
 
-class _Offered(ChainMap[str, Candidate]):
-    """A mechanism's own candidates and the user's; keeps the list of those that are wrong on purpose."""
-
-    @property
-    def on_purpose(self) -> Iterable[str]:
-        return getattr(self.maps[1], "on_purpose", ())
-
-
-def offer(mechanism: Mechanism, users: Iterable[UserCandidate]) -> None:
-    """Add a user's candidates to those of one mechanism.
+def offer(robot: Robot, users: Iterable[UserCandidate]) -> None:
+    """Add a user's candidates to those of one robot.
 
     Raises
     ------
     SpecError
-        The mechanism has a candidate of that name already.
+        The robot has a candidate of that name already.
     """
     extra = {}
     for user in users:
-        if user.name in mechanism.candidates:
-            raise SpecError(
-                f'{user.where}: {mechanism.name} already has a candidate "{user.name}"; choose another name'
-            )
+        if user.name in robot.candidates:
+            raise SpecError(f'{user.where}: {robot.name} already has a candidate "{user.name}"; choose another name')
         extra[user.name] = user.as_candidate()
     if extra:
-        vars(mechanism)["candidates"] = _Offered(extra, mechanism.candidates)  # type: ignore[arg-type]
+        robot.offer(extra)
 
 
 def with_rows(campaign: Campaign, users: Iterable[UserCandidate]) -> Campaign:

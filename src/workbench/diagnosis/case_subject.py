@@ -11,7 +11,6 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case
-from workbench.campaign.generic import GenericMechanism
 from workbench.campaign.user_candidates import UserCandidate
 from workbench.diagnosis.subject import (
     FRICTION,
@@ -27,7 +26,6 @@ from workbench.diagnosis.subject import (
 from workbench.errors import CandidateError, WorkbenchError
 from workbench.reference import MujocoReference
 from workbench.reference.varied_model import settable, varied_reference
-from workbench.robots.parameters import SIDES, stored_names
 
 KIND_OF_UNIT = {"kg": MASS, "kg m^2": INERTIA, "m/s^2": GRAVITY, "m": LENGTH, "1": NUMBER, "kg or kg m^2": INERTIA}
 
@@ -60,25 +58,25 @@ class CaseSubject:
     def __init__(self, case: Case, candidate: str, mass_model: str, others: Sequence[Case] = ()) -> None:
         self.case, self.candidate, self.mass_model = case, candidate, mass_model
         self._others = tuple(others)
-        self._mechanism = case.mechanism
-        self._function = case.mechanism.candidates[candidate].function
+        self._robot = case.robot
+        self._function = case.robot.candidates[candidate].function
         self._references: dict[tuple[tuple[str, float], ...], MujocoReference] = {}
         self._mechanisms: dict[tuple[tuple[str, float], ...], Any] = {}
 
     @property
     def title(self) -> str:
         """Candidate, robot and case."""
-        return f'"{self.candidate}" on {self._mechanism.title or self._mechanism.name}, case {self.case.name}'
+        return f'"{self.candidate}" on {self._robot.title or self._robot.name}, case {self.case.name}'
 
     @property
     def joints(self) -> tuple[str, ...]:
         """Actuated joints."""
-        return self._mechanism.joints
+        return tuple(self._robot.joints)
 
     @property
     def force_units(self) -> tuple[str, ...]:
         """Unit of each torque."""
-        return self._mechanism.force_units
+        return tuple(self._robot.force_units)
 
     @property
     def takes_force(self) -> bool:
@@ -110,7 +108,7 @@ class CaseSubject:
         reads: set[str] = set()
         q, qd, qdd = (array[: min(len(array), 3)] for array in self.motion)
         force = np.ones((len(q), 3))
-        handed: Any = _Handed(Recorded(self._mechanism.parameters, reads), self.joints)
+        handed: Any = _Handed(Recorded(self._robot.parameters, reads), self.joints)
         try:
             self._function(handed, q, qd, qdd, force)
         except CandidateError:
@@ -132,17 +130,19 @@ class CaseSubject:
         if self.reads is not None and not self.reads:
             return ()
         found = []
-        table = stored_names(self._mechanism.parameter_table)
-        read = self._names_read(table)
+        table = self._robot.description.table
+        read = [name for name in (*table.infos, *table.groups) if self.reads is None or name in self.reads]
+        if self.reads is None:
+            read = list(table.infos)
         for name in read:
-            info = table.get(name) or table[f"{name}_{SIDES[0]}"]
-            kind = KIND_OF_UNIT.get(info.unit, FRICTION)
-            found.append(Parameter(name, info.unit, kind, float(getattr(self._mechanism.parameters, name)), True))
-        covered = {side for name in read for side in (name, *(f"{name}_{s}" for s in SIDES))}
-        for name, info in table.items():
+            unit = table.infos[table.members(name)[0]].unit
+            kind = KIND_OF_UNIT.get(unit, FRICTION)
+            found.append(Parameter(name, unit, kind, float(getattr(self._robot.parameters, name)), True))
+        covered = {member for name in read for member in table.members(name)}
+        for name, info in table.infos.items():
             kind = KIND_OF_UNIT.get(info.unit, FRICTION)
             if name not in covered and kind in (MASS, GRAVITY, INERTIA, FRICTION):
-                value = float(getattr(self._mechanism.parameters, name))
+                value = float(getattr(self._robot.parameters, name))
                 if value != 0.0:
                     found.append(Parameter(name, info.unit, kind, value, False))
         if self._generic:
@@ -150,20 +150,15 @@ class CaseSubject:
             found = [parameter for parameter in found if parameter.name in able]
         return tuple(found)
 
-    def _names_read(self, table: Any) -> list[str]:
-        if self.reads is None:
-            return list(table)
-        bare = {name.rsplit("_", 1)[0] for name in table if name.rsplit("_", 1)[-1] in SIDES}
-        order = [*table, *sorted(bare)]
-        return [name for name in order if name in self.reads]
-
     @property
     def _generic(self) -> bool:
-        return isinstance(self._mechanism, GenericMechanism)
+        """Whether the robot's numbers are varied in the compiled model, since nothing else keeps both sides alike."""
+        return self._robot.closed_form is None
 
     @property
     def _read_map(self) -> dict[str, str]:
-        return dict(self._mechanism.made_by[2]) if isinstance(self._mechanism, GenericMechanism) else {}
+        targets = self._robot.description.targets
+        return {target.reads: target.words for target in reversed(targets) if target.reads and target.words}
 
     def _pinned(self, changes: Changes) -> dict[str, float]:
         """Changes together with all that the formula reads, so that no rule moves another parameter along."""
@@ -174,19 +169,19 @@ class CaseSubject:
         return pins | dict(changes)
 
     def values(self, changes: Changes) -> Any:
-        """The parameters with changes; as a dict where their class is made for this robot and cannot be pickled."""
-        parameters = self._changed(changes).parameters
-        return dataclasses.asdict(parameters) if self._generic else parameters
+        """The parameters with changes, as the formula is handed them."""
+        return self._changed(changes).parameters
 
     def _changed(self, changes: Changes) -> Any:
         key = tuple(sorted(changes.items()))
         if key not in self._mechanisms:
             if not changes:
-                found: Any = self._mechanism
+                found: Any = self._robot
             elif self._generic:
-                found = _Handed(dataclasses.replace(self._mechanism.parameters, **changes), self.joints)
+                expanded = self._robot.description.table.expand(changes)
+                found = _Handed(dataclasses.replace(self._robot.parameters, **expanded), self.joints)
             else:
-                found = self._mechanism.with_parameters(**self._pinned(changes))
+                found = self._robot.with_parameters(**self._pinned(changes))
             self._mechanisms[key] = found
         return self._mechanisms[key]
 
@@ -214,13 +209,12 @@ class CaseSubject:
         return self._references[key]
 
     def _make_reference(self, changes: Changes) -> MujocoReference:
-        case = self.case
-        if not isinstance(self._mechanism, GenericMechanism):
-            values: dict[str, Any] = case.overrides | self._pinned(changes)
-            return MujocoReference(case.model, **values)
         if not changes:
-            return self._mechanism.reference
-        return varied_reference(self._mechanism.reference, self._read_map, changes, self.mass_model, True)
+            return self._robot.reference
+        if not self._generic:
+            return self._robot.with_parameters(**self._pinned(changes)).reference
+        expanded = self._robot.description.table.expand(changes)
+        return varied_reference(self._robot.reference, self._read_map, expanded, self.mass_model, True)
 
     def torques_of_reference(
         self, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray, changes: Changes

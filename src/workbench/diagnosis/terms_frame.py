@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from workbench.campaign.cases import resolve_cases
 from workbench.campaign.spec import load_campaign
-from workbench.reference import MujocoReference
 from workbench.reference.terms import torque_terms
 
 if TYPE_CHECKING:
@@ -52,11 +51,10 @@ def terms(
     pieces = []
     units: dict[str, Any] = {}
     for one in resolve_cases(spec, file, model, (case,) if case else ()):
-        overrides: dict[str, Any] = one.overrides
-        reference = MujocoReference(one.model, loaded=one.loaded, setup=one.setup, **overrides)
+        reference = one.robot.reference
         motion = one.motion
         found = torque_terms(reference, motion.q, motion.qd, motion.qdd, mass_model, one.force)
-        units = dict(zip(found.joints, one.mechanism.force_units, strict=True))
+        units = dict(zip(found.joints, one.robot.force_units, strict=True))
         n, na = found.tau.shape
         at = {"case": one.name, "t": np.repeat(motion.t, na), "joint": np.tile(found.joints, n)}
         pieces += [

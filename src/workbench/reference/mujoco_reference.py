@@ -20,10 +20,13 @@ from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf.compile import custom_text
 from workbench.mjcf.setup import Setup
-from workbench.reference.closure import Assembly, LoopCloser
+from workbench.reference.closure import LoopCloser
+from workbench.reference.continuation import Assembly
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
 from workbench.reference.freedoms import check_freedoms
 from workbench.reference.kernels import projection, velocities
+from workbench.reference.platform_closure import PlatformCloser
+from workbench.reference.platform_side import PlatformSide
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
 from workbench.reference.structure import Structure, read_structure
@@ -46,6 +49,12 @@ class ReferenceResult:
     """``(n, 3)`` platform position, m"""
     xd: FloatArray
     xdd: FloatArray
+    rotation: FloatArray
+    """``(n, 3, 3)`` of the platform site: vector in the base's frame = rotation @ vector in the site's frame"""
+    omega: FloatArray
+    """``(n, 3)`` angular velocity of the platform, rad/s"""
+    alpha: FloatArray
+    """``(n, 3)`` angular acceleration of the platform, rad/s^2"""
     reactions: dict[str, FloatArray]
     """force ``(n, 3)`` in N, base frame, that the parent exerts on the child body at each joint, and that the second
     site's body exerts on the first's at each loop closure; none where there are more actuators than freedoms"""
@@ -78,7 +87,7 @@ class Mobility:
     """spins of rods between two spherical joints about their own axes"""
 
 
-class MujocoReference:
+class MujocoReference(PlatformSide):
     """Closed-chain inverse dynamics of an MJCF model.
 
     Parameters
@@ -124,6 +133,7 @@ class MujocoReference:
         self._reaction_rows = reaction_rows(loaded.model, self._structure)
         self._leader: tuple[MujocoReference, np.ndarray] | None = None
         self._closed: tuple[FloatArray, Assembly] | None = None
+        self._platform: dict[tuple[str, ...], PlatformCloser] = {}
         self._base_rotation = np.eye(3)
         self._locate_base()
         self._check_freedoms()
@@ -132,6 +142,12 @@ class MujocoReference:
     def joint_names(self) -> tuple[str, ...]:
         """Actuated joints, in actuator order."""
         return self._structure.joint_names
+
+    @property
+    def home(self) -> FloatArray:
+        """Actuated coordinates ``(na,)`` of the closed home pose, m and rad."""
+        home: FloatArray = self._closer.home[self._structure.actuated_qpos].copy()
+        return home
 
     @property
     def actuated_slides(self) -> tuple[bool, ...]:
@@ -233,6 +249,7 @@ class MujocoReference:
         model, assembly = engine.model, self._assemble(q)
         qpos, (qvel, qacc) = assembly.qpos, np.zeros((2, n, model.nv))
         tau, motion, energy = np.zeros_like(q), np.zeros((3, n, 3)), np.zeros((n, 2))
+        turning = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         velocity_residual, acceleration_residual = np.zeros((2, n))
         # the kernel fills a row for every body, also for fixed ones that follow the last joint
         reactions = np.zeros((len(structure.blocks) + model.nbody, n, 3))
@@ -247,7 +264,7 @@ class MujocoReference:
                 *self._tables, poses.tables, dynamics.tables, self._mass_layout, platform, masses, gravity,
                 self._base_rotation, self._base_position, qpos[rows], qvel[rows], assembly.tangent[rows], qdd[rows],
                 force[rows], qacc[rows], tau[rows], velocity_residual[rows], acceleration_residual[rows],
-                motion[:, rows], reactions[:, rows],
+                motion[:, rows], (turning[0][rows], turning[1][rows], turning[2][rows]), reactions[:, rows],
             )  # fmt: skip
             energy[rows] = dynamics.energy[: rows.stop - rows.start]
 
@@ -256,7 +273,8 @@ class MujocoReference:
         # in MuJoCo dry friction is a constraint, so neither bias nor passive forces hold it
         tau += model.dof_frictionloss[structure.actuated] * direction(qd)
         return ReferenceResult(
-            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], reactions=named(self._reaction_rows, reactions),
+            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], rotation=turning[0], omega=turning[1],
+            alpha=turning[2], reactions=named(self._reaction_rows, reactions),
             closure_residual=assembly.residual.copy(), velocity_residual=velocity_residual,
             acceleration_residual=acceleration_residual, rank=assembly.rank.copy(),
             condition=assembly.condition.copy(), energy=energy, qpos=qpos.copy(), qvel=qvel, qacc=qacc,
@@ -334,7 +352,7 @@ class MujocoReference:
     def _led_by(self, structure: Structure) -> MujocoReference:
         """The same model, driven by fewer of its actuators."""
         led = copy.copy(self)
-        led._structure, led._leader, led._closed = structure, None, None
+        led._structure, led._leader, led._closed, led._platform = structure, None, None, {}
         led._closer = LoopCloser(self._engines["distributed"], structure)
         tables = led._closer.tables
         led._tables = tables.closures, tables.joints, tables.split, tables.bodies

@@ -13,10 +13,10 @@ import mujoco
 import numpy as np
 
 from workbench.errors import ParameterError
-from workbench.mjcf.quantities import AXES
 from workbench.reference.engine import LUMPED_INERTIA
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.robots.load import LoadedModel
+from workbench.robots.places import AXES
 
 SETTABLE = ("mass", "inertia", "damping", "armature", "gravity")
 """Kinds of quantities that can be changed without moving the geometry."""

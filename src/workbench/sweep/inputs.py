@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.campaign import provenance
-from workbench.campaign.cases import locate
+from workbench.campaign.cases import locate, robot_files
 from workbench.campaign.spec import Campaign, CsvMotion
 
 
@@ -48,7 +48,7 @@ def _look(path: Path) -> _Seen:
 
 
 def inputs_of(campaign: Campaign, file: Path, model: Path) -> Inputs:
-    """The model, and the table of a motion given by one."""
+    """The model with its robot file, and the table of a motion given by one."""
     motion = campaign.case[0].motion
     tables = [locate(file, motion.file, "motion.file")] if isinstance(motion, CsvMotion) else []
-    return Inputs([model, *tables])
+    return Inputs([*robot_files(campaign, file, model), *tables])
