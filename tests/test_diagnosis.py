@@ -105,6 +105,14 @@ def test_numbers_that_are_equal_in_this_robot_are_told_apart(repository: Path, t
     assert not found.wrong  # with this robot's own numbers nothing shows
 
 
+def test_a_parameter_that_is_never_read_is_said_to_be_missing(repository: Path, tmp_path: Path) -> None:
+    found = diagnosed(
+        *spoiled(repository, tmp_path, "delta", "force = p.mp * (x + weight) + at", "force = at"), "exact"
+    )
+    assert {name for f in found.findings for name in f.parameters} == {"mp"}
+    assert all(f.ratio == "missing" for f in found.findings if f.parameters)
+
+
 def test_single_precision_is_noise_and_no_wrong_term(repository: Path, tmp_path: Path) -> None:
     old = "    return arm + (tangent * at_elbow)"
     new = "    arm = arm.astype(np.float32).astype(float)\n" + old

@@ -10,6 +10,7 @@ import pytest
 
 import workbench as wb
 from own_mechanisms import PARALLELOGRAM
+from workbench.campaign.cases import base_robot
 from workbench.campaign.spec import load_campaign
 from workbench.mjcf.compile import compile_text
 from workbench.mjcf.setup import Setup
@@ -26,8 +27,7 @@ Robot = tuple[MujocoReference, np.ndarray, np.ndarray, np.ndarray, str]
 
 
 def own(repository: Path, name: str) -> MujocoReference:
-    campaign, _ = load_campaign(repository / "examples" / name / f"{name}.toml")
-    return MujocoReference(repository / "examples" / name / f"{name}.xml", setup=campaign.setup)
+    return base_robot(*load_campaign(repository / "examples" / name / f"{name}.toml"))[0].reference
 
 
 @pytest.fixture(params=["almeida", "almeida lumped", "garcia", *EXAMPLES])

@@ -77,5 +77,5 @@ def missing_from(share: Share, formula: Parts, reference: Parts, part: Part, joi
         return False
     step = parameter.varied - parameter.value
     worth = share.reference[part][:, joint] * (parameter.value / step)
-    gap = formula[part][:, joint] - reference[part][:, joint]
+    gap = (formula[part] - reference[part])[: len(worth), joint]
     return bool(np.abs(worth).max() > 0.0 and ratio_of(gap, worth) == -1)
