@@ -29,6 +29,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("mjcf",),
     (
         "motion",
+        "delimited",
+        "hints",
         "metrics",
         "dry_friction",
         "staging",

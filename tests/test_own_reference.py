@@ -9,7 +9,7 @@ import pytest
 
 from own_mechanisms import FOURBAR, PARALLELOGRAM
 from workbench.campaign.robot_spec import RobotKeys
-from workbench.capabilities.robot import robot_with
+from workbench.capabilities.load import robot_with
 from workbench.errors import ModelError, MotionError, WorkbenchError
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
@@ -146,26 +146,6 @@ REFUSED = {
         Setup(("crank",), "coupler", initial=GUESS),
         "limits are not covered",
     ),
-    "springs": (
-        FOURBAR.replace('name="elbow"', 'name="elbow" stiffness="3"'),
-        Setup(("crank",), "coupler", initial=GUESS),
-        "springs are not covered",
-    ),
-    "springs without a linear term": (
-        FOURBAR.replace('name="elbow"', 'name="elbow" stiffness="0 5 3"'),
-        Setup(("crank",), "coupler", initial=GUESS),
-        "has stiffness 0 5 3; springs are not covered",
-    ),
-    "gravity compensation": (
-        FOURBAR.replace('<body name="coupler"', '<body name="coupler" gravcomp="1"'),
-        Setup(("crank",), "coupler", initial=GUESS),
-        'body "coupler" has gravcomp 1',
-    ),
-    "fluid": (
-        FOURBAR.replace("<option>", '<option viscosity="0.1">'),
-        Setup(("crank",), "coupler", initial=GUESS),
-        "<option viscosity> is 0.1",
-    ),
     "loops switched off": (
         FOURBAR.replace("<flag ", '<flag equality="disable" '),
         Setup(("crank",), "coupler", initial=GUESS),
@@ -186,11 +166,6 @@ REFUSED = {
         Setup(("crank",), "coupler", initial=GUESS),
         'joint "loose" is free',
     ),
-    "tendons": (
-        FOURBAR.replace("<equality>", '<tendon><fixed><joint joint="crank" coef="1"/></fixed></tendon><equality>'),
-        Setup(("crank",), "coupler", initial=GUESS),
-        "tendon",
-    ),
 }
 
 
@@ -203,7 +178,7 @@ def test_what_is_not_covered_is_refused(tmp_path: Path, name: str) -> None:
         MujocoReference(tmp_path / "model.xml", setup=setup)
 
 
-@pytest.mark.parametrize("what", ["limits", "springs", "contacts", "free bodies", "tendons"])
+@pytest.mark.parametrize("what", ["limits", "contacts", "free bodies"])
 def test_what_is_not_covered_can_be_ignored(tmp_path: Path, single: MujocoReference, what: str) -> None:
     expected = whole_turn(single).tau
     found = reference(tmp_path, REFUSED[what][0], ("crank",), initial=GUESS, ignore=(what,))

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import workbench as wb
-from own_mechanisms import PARALLELOGRAM
+from own_mechanisms import FOURBAR, PARALLELOGRAM
+from test_counted_forces import FEATURES, SETUP, motion, with_feature
 from workbench.campaign.cases import base_robot
 from workbench.campaign.spec import load_campaign
 from workbench.mjcf.compile import compile_text
@@ -17,7 +18,10 @@ from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
 from workbench.reference.regressor import NUMBERS, inertial_numbers, inertial_regressor
 from workbench.reference.terms import ACCELERATION, PARTS, VELOCITY, WEIGHT, torque_terms
+from workbench.reference.varied_model import places_of, settable, varied_reference
 from workbench.robots.load import LoadedModel
+from workbench.robots.parameters import Target
+from workbench.robots.places import parse_place
 
 FORCE = np.array([12.0, -8.0, 25.0])
 FRICTION = {"damping_q1": 3.0, "coulomb_q2": 0.2, "armature_q3": 0.01, "damping_slide": 0.7}
@@ -153,3 +157,66 @@ def test_more_actuators_than_freedoms_have_no_terms(repository: Path, tmp_path: 
     reference = MujocoReference(path, setup=setup)
     with pytest.raises(wb.WorkbenchError, match="more than freedoms"):
         torque_terms(reference, [[0.8, 0.8]], [[0.0, 0.0]], [[0.0, 0.0]])
+
+
+def places(*words: str) -> dict[str, tuple[Target, ...]]:
+    return places_of(parse_place(text, name, "robot.toml") for name, text in (w.split(": ") for w in words))
+
+
+def test_a_parameter_changes_the_bodies_that_its_places_name(repository: Path) -> None:
+    reference = own(repository, "delta")
+    model = reference.compiled()
+    arms = [model.body(f"arm{limb}").id for limb in (1, 2, 3)]
+    before = float(model.body_mass[arms[0]])
+
+    def masses(changes: dict[str, float], *words: str) -> list[float]:
+        made = varied_reference(reference, places(*words), {"m": before, "k": before}, changes, "distributed", True)
+        return [float(made.compiled().body_mass[arm]) for arm in arms]
+
+    # several places: those and no others, although all arms weigh the same
+    assert masses({"m": 0.5}, "m: mass arm1", "m: mass arm2") == [0.5, 0.5, before]
+    # one place stands for all that are alike, but for those of other parameters
+    assert masses({"m": 0.5}, "m: mass arm1") == [0.5, 0.5, 0.5]
+    assert masses({"m": 0.5}, "m: mass arm1", "k: mass arm3") == [0.5, 0.5, before]
+    # what stands there is a product, and another parameter of it stays
+    assert masses({"m": 0.5}, "m: mass arm1 = 2 * m", "k: mass arm3", "k: mass arm2") == [1.0, before, before]
+    assert settable(places("m: mass arm1", "a: offset arm1 x", "m: site foot1 x", "g: gravity z = -g")) == {"g"}
+    with pytest.raises(wb.WorkbenchError, match="cannot be set"):
+        masses({"a": 0.5}, "a: offset arm1 x")
+    field = varied_reference(reference, places("g: gravity z = -g"), {"g": 9.81}, {"g": 4.0}, "distributed", True)
+    assert list(field.compiled().opt.gravity) == [0.0, 0.0, -4.0]
+
+
+def test_two_axes_of_one_inertia_are_moved_once(repository: Path) -> None:
+    reference = own(repository, "bricard")
+    model = reference.compiled()
+    rod = model.body("rod1").id
+    value = 1.5 * float(np.sort(model.body_inertia[rod])[1])
+    both = places("I: inertia rod1 y", "I: inertia rod1 z", "J: inertia rod1 x")
+    for words in (both, places("I: inertia rod1 y", "J: inertia rod1 x")):
+        made = varied_reference(reference, words, {"I": 0.0, "J": 0.0}, {"I": value}, "distributed", True)
+        assert np.allclose(np.sort(made.compiled().body_inertia[rod])[1:], value, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", FEATURES)
+def test_every_force_that_the_reference_counts_is_an_item(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "fourbar.xml"
+    path.write_text(with_feature(name), encoding="utf-8")
+    reference = MujocoReference(path, setup=SETUP)
+    q, qd, qdd = motion(np.linspace(0.0, 1.0, 11))
+    terms = torque_terms(reference, q, qd, qdd)
+    assert off(terms.total, terms.tau) < 1e-12
+    # the twin: without the force these items are others
+    path.write_text(FOURBAR, encoding="utf-8")
+    plain = torque_terms(MujocoReference(path, setup=SETUP), q, qd, qdd)
+    assert off(plain.total, terms.tau) > 1e-4
+    bodies = sum(item.tau for item in terms.items if item.body != "joints")
+    numbers = inertial_numbers(reference.compiled())
+    assert off(inertial_regressor(reference, q, qd, qdd).matrix @ numbers.ravel(), bodies) < 1e-12
+
+
+def test_parts_that_leave_something_out_are_refused(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("workbench.reference.terms._of_joints", lambda *_: [])
+    reference = wb.MujocoReference(repository / "models" / "asym_2rss_ppap.xml", **FRICTION)
+    with pytest.raises(wb.WorkbenchError, match="leave out"):
+        torque_terms(reference, [[0.02, 0.75, 0.85]], [[1.0, 1.0, 1.0]], [[0.0, 0.0, 0.0]])

@@ -29,7 +29,7 @@ KERNEL_FILES = (
         for path in sorted(ROOT.glob(f"robots/*/{name}.py"))
     ),
     *(f"robots/{name}.py" for name in ("blocks", "sine_cosine")),
-    *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "structure", "tables")),
+    *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "kinds", "tables", "frames")),
     *(f"reference/{name}.py" for name in ("task_rows", "platform_kernels")),
 )
 """What machine code is made of. A kernel calls into other files, and its cache must not outlive a change in those."""

@@ -9,30 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.campaign.spec import (
-    MAX_SAMPLES,
-    Campaign,
-    CaseSpec,
-    CsvMotion,
-    CycleMotion,
-    MultiSineMotion,
-    SineMotion,
-)
+from workbench.campaign.motion_spec import MAX_SAMPLES
+from workbench.campaign.planned import formula_of, planned_motion
+from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.user_candidates import UserCandidate, offer
-from workbench.capabilities.robot import Robot, robot_with
+from workbench.capabilities.load import robot_with
+from workbench.capabilities.robot import Robot
 from workbench.data_files import bundled, bundled_names
 from workbench.documents import shorten
-from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
-from workbench.motion import (
-    JointMotion,
-    PickAndPlace,
-    PlatformMotion,
-    from_csv,
-    multi_sine,
-    pick_and_place,
-    sine,
-    time_grid,
-)
+from workbench.errors import MotionError, SpecError, WorkbenchError, did_you_mean
+from workbench.motion import JointMotion, PlatformMotion
 from workbench.reference.replay import motion_through
 from workbench.robots.assignments import resolve_changes
 from workbench.robots.catalogue import bundled_robot, bundled_robots
@@ -260,10 +246,10 @@ def _resolve(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float
     try:
         if isinstance(planned, PlatformMotion):
             q, qd, qdd = robot.joint_motion(planned.x, planned.xd, planned.xdd)
-            motion = JointMotion(planned.t, q, qd, qdd)
+            motion = JointMotion(planned.t, q, qd, qdd, planned.warnings)
         else:
             motion = planned
-        x, xd, xdd = robot.platform_motion(motion.q, motion.qd, motion.qdd)
+        x, xd, xdd = robot.platform_along(motion.t, motion.q, motion.qd, motion.qdd)
         robot.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
     except MotionError as error:
         raise with_unit_hint(at_time(error, planned.t), robot) from error
@@ -297,24 +283,14 @@ def plan_motion(spec: CaseSpec, file: Path, robot: Robot) -> JointMotion | Platf
     ParameterError
         Another number of joints than the mechanism has.
     """
-    motion = spec.motion
-    if isinstance(motion, CsvMotion):
-        return from_csv(locate(file, motion.file, "motion.file"), robot.joints)
-    if isinstance(motion, CycleMotion):
-        return pick_and_place(**motion.model_dump(exclude={"kind"}))
-    joints = len(motion.terms) if isinstance(motion, MultiSineMotion) else len(motion.amplitude)
-    if len(motion.offset) != len(robot.joints) or joints != len(robot.joints):
-        raise ParameterError(
-            f"motion: {len(motion.offset)} offset(s) and {joints} joint(s); {robot.name} has"
-            f" {len(robot.joints)} actuated joints: {', '.join(robot.joints)}"
-        )
-    return _harmonic(motion, time_grid(motion.start, motion.stop, samples=motion.samples, rate=motion.rate))
-
-
-def _harmonic(motion: SineMotion | MultiSineMotion, t: FloatArray) -> JointMotion:
-    if isinstance(motion, SineMotion):
-        return sine(t, motion.offset, motion.amplitude, motion.frequency, motion.phase)
-    return multi_sine(t, motion.offset, motion.terms)
+    return planned_motion(
+        spec.motion,
+        lambda name: locate(file, name, "motion.file"),
+        robot.name,
+        robot.joints,
+        robot.coordinate_units,
+        robot.coordinates,
+    )
 
 
 Course = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
@@ -326,20 +302,14 @@ def course_of(case: Case) -> Course:
 
     The function raises MotionError for times or poses that the motion does not have.
     """
-    motion = case.spec.motion
-    if isinstance(motion, SineMotion | MultiSineMotion):
+    formula = formula_of(case.spec.motion, case.robot.coordinates)
+    if formula is not None:
 
-        def harmonic(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            found = _harmonic(motion, t)
+        def course(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            found = formula(t)
+            if isinstance(found, PlatformMotion):
+                return case.robot.joint_motion(found.x, found.xd, found.xdd)
             return found.q, found.qd, found.qdd
 
-        return harmonic
-    if isinstance(motion, CycleMotion):
-        plan = PickAndPlace(**motion.model_dump(exclude={"kind", "samples", "rate"}))
-
-        def cycle(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            found = plan.sample(np.clip(t, 0.0, plan.duration))
-            return case.robot.joint_motion(found.x, found.xd, found.xdd)
-
-        return cycle
+        return course
     return motion_through(case.motion.t, case.motion.q, case.motion.qd, case.motion.qdd)

@@ -20,6 +20,7 @@ from workbench.campaign.torques import Fault, torques_of
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdict_of
 from workbench.errors import ModelError, MotionError
+from workbench.hints import hint_of
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.raw_inverse import raw_mj_inverse
 from workbench.reference.skeleton import skeleton
@@ -100,7 +101,9 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     series = _motion_columns(case)
     try:
         for mass_model in dict.fromkeys(c.reference for c in campaign.candidate) or ("distributed",):
-            results[mass_model] = reference.inverse_dynamics(motion.q, motion.qd, motion.qdd, mass_model, case.force)
+            results[mass_model] = reference.inverse_dynamics(
+                motion.q, motion.qd, motion.qdd, mass_model, case.force, along=motion.t
+            )
         computed = torques_of(case, dict.fromkeys(c.name for c in campaign.candidate))
         torques = computed.torques
     except MotionError as error:
@@ -117,6 +120,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for row in _rows(case, candidate, computed.judged(candidate.name), results[candidate.reference], evidence)
     ]
     rows = [dataclasses.replace(row, verdict=FAIL) if row.candidate in computed.faults else row for row in rows]
+    hints = _hints(case, rows, torques, results)
     if effort.budget:
         rows += _raw_rows(case, reference, results, evidence)
     for mass_model, result in results.items():
@@ -129,6 +133,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual
     facts = _facts(case, reference, first, rows, platform) | {"evidence": evidence.facts()}
+    facts["warnings"] += hints
     if effort.drawing:
         drawing = skeleton(reference, first.qpos)
         for point, place in drawing.points.items():
@@ -141,6 +146,18 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     poses = first.qpos if effort.drawing else None
     faults = tuple(computed.faults.values())
     return CaseResult(case.name, rows, series, computed.noted(facts), faults, reference.text, poses)
+
+
+def _hints(
+    case: Case, rows: Sequence[Row], torques: Mapping[str, FloatArray], results: Mapping[str, ReferenceResult]
+) -> list[str]:
+    """What the errors of candidates that fail look like, where they have a familiar shape."""
+    failed = dict.fromkeys((row.candidate, row.reference) for row in rows if row.verdict in FAILURES)
+    said = []
+    for name, reference in failed:
+        words = hint_of(torques[name], results[reference].tau, case.motion.t, case.robot.joints)
+        said += [f'candidate "{name}" against "{reference}": {words}'] if words else []
+    return said
 
 
 def _refuse_other_branch(case: Case, x: FloatArray) -> None:
@@ -164,7 +181,7 @@ def _raw_rows(
     motion = case.motion
     name = "distributed" if "distributed" in results else next(iter(results))
     spec = CandidateSpec(name=RAW_NAME, reference=name)
-    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force)
+    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force, motion.t)
     rows = _rows(case, spec, tau, results[name], evidence)
     return [dataclasses.replace(row, candidate=RAW_INVERSE, kind=CONTRAST) for row in rows]
 
@@ -264,5 +281,8 @@ def _facts(
         "conditions": [dataclasses.asdict(c) for c in case.robot.conditions(case.motion.q)],
         "solutions_at_start": case.robot.assembly_solutions(case.motion.q[:1])[0].tolist(),
         "peak_reactions": {name: float(np.linalg.norm(f, axis=1).max()) for name, f in result.reactions.items()},
-        "warnings": case.robot.warnings(case.motion.t, case.motion.q, case.motion.qd),
+        "warnings": [
+            *case.motion.warnings,
+            *case.robot.warnings(case.motion.t, case.motion.q, case.motion.qd),
+        ],
     }

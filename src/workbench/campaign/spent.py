@@ -8,6 +8,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case
+from workbench.errors import ParameterError
 from workbench.reference import MujocoReference
 from workbench.reference.terms import torque_terms
 
@@ -22,12 +23,16 @@ def spent_on(case: Case, reference: MujocoReference, mass_model: str) -> tuple[d
     -------
     columns, facts
         ``part_PART_JOINT`` ``(n,)`` in N or N m, which add up to the torque; and root mean squares by part and by body,
-        joint by joint. Both empty where there are more actuators than freedoms, or too many samples.
+        joint by joint. Both empty where there are more actuators than freedoms, too many samples, or summands of
+        another kind.
     """
     motion = case.motion
     if reference.excess_actuators or len(motion.t) > MOST_SAMPLES:
         return {}, {}
-    terms = torque_terms(reference, motion.q, motion.qd, motion.qdd, mass_model, case.force)
+    try:
+        terms = torque_terms(reference, motion.q, motion.qd, motion.qdd, mass_model, case.force, motion.t)
+    except ParameterError:  # a summand that has no name here: no parts rather than parts that do not add up
+        return {}, {}
     parts = {key[0]: tau for key, tau in terms.by("part").items()}
     bodies = {key[0]: tau for key, tau in terms.by("body").items()}
     columns = {

@@ -38,7 +38,7 @@ def workspace(
     """Compute the reachable workspace by discretisation: volume with its error, cells as Parquet, figures."""
     from workbench.campaign.cases import resolve_cases
     from workbench.campaign.spec import load_campaign
-    from workbench.capabilities.robot import robot_with
+    from workbench.capabilities.load import robot_with
     from workbench.console import print_workspace
     from workbench.report.workspace import draw_workspace
     from workbench.robots.assignments import resolve_changes

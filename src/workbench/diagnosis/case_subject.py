@@ -25,7 +25,7 @@ from workbench.diagnosis.subject import (
 )
 from workbench.errors import CandidateError, WorkbenchError
 from workbench.reference import MujocoReference
-from workbench.reference.varied_model import settable, varied_reference
+from workbench.reference.varied_model import Targets, places_of, settable, varied_reference
 
 KIND_OF_UNIT = {"kg": MASS, "kg m^2": INERTIA, "m/s^2": GRAVITY, "m": LENGTH, "1": NUMBER, "kg or kg m^2": INERTIA}
 
@@ -146,7 +146,7 @@ class CaseSubject:
                 if value != 0.0:
                     found.append(Parameter(name, info.unit, kind, value, False))
         if self._generic:
-            able = settable(self._read_map)
+            able = settable(self._targets)
             found = [parameter for parameter in found if parameter.name in able]
         return tuple(found)
 
@@ -155,10 +155,10 @@ class CaseSubject:
         """Whether the robot's numbers are varied in the compiled model, since nothing else keeps both sides alike."""
         return self._robot.closed_form is None
 
-    @property
-    def _read_map(self) -> dict[str, str]:
-        targets = self._robot.description.targets
-        return {target.reads: target.words for target in reversed(targets) if target.reads and target.words}
+    @cached_property
+    def _targets(self) -> Targets:
+        """Where the robot file says that each parameter stands."""
+        return places_of(self._robot.description.targets)
 
     def _pinned(self, changes: Changes) -> dict[str, float]:
         """Changes together with all that the formula reads, so that no rule moves another parameter along."""
@@ -214,7 +214,9 @@ class CaseSubject:
         if not self._generic:
             return self._robot.with_parameters(**self._pinned(changes)).reference
         expanded = self._robot.description.table.expand(changes)
-        return varied_reference(self._robot.reference, self._read_map, expanded, self.mass_model, True)
+        return varied_reference(
+            self._robot.reference, self._targets, self._robot.values, expanded, self.mass_model, True
+        )
 
     def torques_of_reference(
         self, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray, changes: Changes

@@ -33,9 +33,9 @@ def terms(
     -------
     pandas.DataFrame
         One row per case, sample, joint and item, with the columns ``case``, ``t`` (s), ``joint``, ``part`` (weight,
-        acceleration, velocity, friction, external force), ``body``, ``direction`` (x, y, z of the base frame, turning)
-        and ``torque``, in the unit that ``frame.attrs["units"]["torque"]`` has for the joint. Grouped over items the
-        torques add up to the reference's, to rounding.
+        acceleration, velocity, springs, friction, external force), ``body``, ``direction`` (x, y, z of the base frame,
+        turning) and ``torque``, in the unit that ``frame.attrs["units"]["torque"]`` has for the joint. Grouped over
+        items the torques add up to the reference's, to rounding.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def terms(
     for one in resolve_cases(spec, file, model, (case,) if case else ()):
         reference = one.robot.reference
         motion = one.motion
-        found = torque_terms(reference, motion.q, motion.qd, motion.qdd, mass_model, one.force)
+        found = torque_terms(reference, motion.q, motion.qd, motion.qdd, mass_model, one.force, motion.t)
         units = dict(zip(found.joints, one.robot.force_units, strict=True))
         n, na = found.tau.shape
         at = {"case": one.name, "t": np.repeat(motion.t, na), "joint": np.tile(found.joints, n)}

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray
 from workbench.errors import ParameterError
-from workbench.reference.mujoco_reference import MujocoReference, ReferenceResult
+from workbench.reference.mujoco_reference import MujocoReference
+from workbench.reference.result import ReferenceResult
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,12 @@ class BodyMotion:
     """``(n, nb, 3, 3)`` world vector = axes @ vector in the frame that inertia is given in"""
     tangent: FloatArray
     """``(n, nv, na)`` W, all velocities per actuated one"""
+    springs: FloatArray
+    """``(n, nv)`` forces of springs on all coordinates, N and N m"""
+    dampers: FloatArray
+    """``(n, nv)`` those of dampers of joints and tendons"""
+    fluid: FloatArray
+    """``(n, nv)`` those of a fluid"""
     result: ReferenceResult
     """the reference's own inverse dynamics at the samples"""
 
@@ -51,6 +59,7 @@ def body_motion(
     mass_model: str = "distributed",
     external_force: FloatArray | None = None,
     centres: bool = True,
+    along: ArrayLike | None = None,
 ) -> BodyMotion:
     """Evaluate the motion of every body.
 
@@ -66,6 +75,8 @@ def body_motion(
         Newtons on the platform, base frame, ``(3,)`` or ``(n, 3)``; it enters the result only.
     centres
         True: points are mass centres and axes principal ones; False: points are body frames' origins, axes theirs.
+    along
+        Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
 
     Raises
     ------
@@ -79,14 +90,15 @@ def body_motion(
             f"{reference.file}: {reference.excess_actuators} actuator(s) more than freedoms; the torque is one of many"
             " and has no parts by body"
         )
-    result = reference.inverse_dynamics(q, qd, qdd, mass_model, external_force)
-    tangent = reference.tangent(np.asarray(q, dtype=np.float64))
+    result = reference.inverse_dynamics(q, qd, qdd, mass_model, external_force, along=along)
+    tangent = reference.tangent(np.asarray(q, dtype=np.float64), near=result.qpos)
     model = reference.compiled(mass_model)
     data = mujoco.MjData(model)
     n, na, nb = len(result.tau), tangent.shape[2], model.nbody - 1
     linear, angular = np.zeros((2, n, nb, 3, na))
     spin, carried_l, carried_a = np.zeros((3, n, nb, 3))
     axes = np.zeros((n, nb, 3, 3))
+    springs, dampers, fluid = np.zeros((3, n, model.nv))
     point_jac, turn_jac, point_dot, turn_dot = (np.zeros((3, model.nv)) for _ in range(4))
     # qacc = W qdd + what the loops need at qdd = 0
     carried = result.qacc - np.einsum("nva,na->nv", tangent, np.asarray(qdd, dtype=np.float64))
@@ -94,6 +106,7 @@ def body_motion(
         data.qpos[:], data.qvel[:] = result.qpos[sample], result.qvel[sample]
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
+        springs[sample], dampers[sample], fluid[sample] = data.qfrc_spring, data.qfrc_damper, data.qfrc_fluid
         positions, frames = (data.xipos, data.ximat) if centres else (data.xpos, data.xmat)
         axes[sample] = frames[1:].reshape(nb, 3, 3)
         for body in range(1, model.nbody):
@@ -116,5 +129,8 @@ def body_motion(
         angular_carried=carried_a,
         axes=axes,
         tangent=tangent,
+        springs=springs,
+        dampers=dampers,
+        fluid=fluid,
         result=result,
     )

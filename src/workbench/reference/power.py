@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch, as_batches, as_force
 from workbench.errors import ArrayError, MotionError
+from workbench.reference.energy_jump import energy_jump, losses
 from workbench.reference.mujoco_reference import MujocoReference
+from workbench.reference.power_terms import Terms, terms_of
 
 MOST_SAMPLES = 150
 """Samples looked at; a longer motion is thinned out evenly, and the samples of greatest power are always kept."""
@@ -26,6 +28,12 @@ PEAKS = 30
 FIRST_STEP = 0.05
 """First difference step as a fraction of the motion's time scale. Truncation falls with a high power of the step and
 rounding grows with its inverse; over the bundled campaigns they meet at 0.02 to 0.05, near a singular pose lower."""
+
+PLAIN = 5e-12
+"""Of the peak power: what the balance of a robot with few bodies reaches, and a large one's no longer does."""
+
+ROUNDING = 2.0
+"""Roundings in one term of energy or power: of the coordinate or velocity in it, and of the term."""
 
 HALVINGS = 6
 """How often a sample's step is halved at most, in search of the step where truncation meets rounding."""
@@ -59,16 +67,29 @@ class PowerBalance:
     storage: FloatArray
     """dE/dt, kinetic and potential"""
     dissipation: FloatArray
-    """damping qvel^2 + frictionloss |qvel|, summed over all freedoms, passive and ball ones too; never negative"""
+    """damping qvel^2 + frictionloss |qvel|, summed over all freedoms, passive and ball ones too, and what further
+    passive forces take that no energy of MuJoCo's holds: fluid, polynomial damping, gravity compensation"""
     peak_power: float
     """max |tau . qd| over all n samples, the normaliser, W"""
     relative: float
-    """max |residual| / peak_power; NaN where the torques hold NaN and where nothing moves: a balance of nothing judges
-    nothing, and NaN satisfies no bound"""
+    """max |residual| / peak_power, or more where energy jumps between samples of a motion; NaN where the torques hold
+    NaN and where nothing moves: a balance of nothing judges nothing, and NaN satisfies no bound"""
     worst_sample: int
     """index into the n samples of the largest |residual|"""
     differentiation: float
     """difference of dE/dt between two step sizes, over peak_power: below it, `relative` says nothing"""
+    rounding: float
+    """what rounding alone may leave of the balance, over peak_power: machine precision times the terms that cancel in
+    it. In a machine of many heavy bodies they are far larger than the power that the actuators put in"""
+
+    @property
+    def uncertainty(self) -> float:
+        """What the balance holds against the torques, over peak_power.
+
+        It is `relative`; where rounding of the balance's own terms explains that, no more than `PLAIN` is put down to
+        the torques.
+        """
+        return float(np.maximum(np.minimum(self.relative, PLAIN), self.relative - self.rounding))
 
 
 def power_balance(
@@ -79,6 +100,7 @@ def power_balance(
     mass_model: str = "distributed",
     external_force: ArrayLike | None = None,
     tau: ArrayLike | None = None,
+    along: ArrayLike | None = None,
 ) -> PowerBalance:
     """Hold torques against the rate of MuJoCo's energy.
 
@@ -94,6 +116,8 @@ def power_balance(
         Newtons, paper frame, acting on the platform: ``(3,)`` or ``(n, 3)``.
     tau
         Torques to judge, ``(n, na)``; None judges the reference's own.
+    along
+        Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
 
     Raises
     ------
@@ -107,15 +131,16 @@ def power_balance(
     if not len(q):
         raise ArrayError("q: expected at least one sample, got none")
     force = as_force("external_force", external_force, len(q))
-    result = reference.inverse_dynamics(q, qd, qdd, mass_model, force)
+    result = reference.inverse_dynamics(q, qd, qdd, mass_model, force, along=along)
     torques = result.tau if tau is None else _same_shape(tau, q)
     power = np.sum(torques * qd, axis=1)
     peak = float(np.abs(power).max())
     kept = _selection(power)
-    storage, doubt = _energy_rate(reference, q[kept], qd[kept], qdd[kept], mass_model)
-    model = reference.compiled(mass_model)
+    jump = 0.0 if along is None else energy_jump(reference, result, power, force, mass_model, np.asarray(along))
+    storage, doubt, steps = _energy_rate(reference, result.qpos[kept], q[kept], qd[kept], qdd[kept], mass_model)
     qvel = result.qvel[kept]
-    dissipation = qvel**2 @ np.asarray(model.dof_damping) + np.abs(qvel) @ np.asarray(model.dof_frictionloss)
+    terms = terms_of(reference.compiled(mass_model), result.qpos[kept], qvel, result.qacc[kept])
+    dissipation = losses(reference, mass_model, qvel, terms)
     external = np.sum(force[kept] * result.xd[kept], axis=1)
     residual = power[kept] + external - storage - dissipation
     size = np.abs(residual)
@@ -127,10 +152,18 @@ def power_balance(
         storage=storage,
         dissipation=dissipation,
         peak_power=peak,
-        relative=_ratio(float(size.max()), peak),
+        relative=_ratio(max(float(size.max()), jump), peak),
         worst_sample=int(kept[int(np.argmax(np.where(np.isnan(size), np.inf, size)))]),
         differentiation=_ratio(float(doubt.max()), peak),
+        rounding=_ratio(float(_rounding(terms, steps).max()), peak),
     )
+
+
+def _rounding(terms: Terms, steps: FloatArray) -> FloatArray:
+    """What rounding leaves of each sample's balance, W: of the energies' difference quotient, and of the forces."""
+    quotient = terms.energy * 2.0 * float(np.sum(np.abs(WEIGHTS))) / steps
+    found: FloatArray = ROUNDING * np.finfo(np.float64).eps * (quotient + terms.power)
+    return found
 
 
 def _same_shape(tau: ArrayLike, q: FloatArray) -> FloatArray:
@@ -165,16 +198,16 @@ def time_scale(qd: FloatArray, qdd: FloatArray) -> float:
 
 
 def _energy_rate(
-    reference: MujocoReference, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str
-) -> tuple[FloatArray, FloatArray]:
-    """Return dE/dt ``(m,)`` and how far it is in doubt, both in watts."""
+    reference: MujocoReference, qpos: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return dE/dt ``(m,)``, how far it is in doubt, both in watts, and the step that it was found with, s."""
     scale = time_scale(qd, qdd)
     if not np.isfinite(scale):
-        return np.zeros(len(q)), np.zeros(len(q))
+        return np.zeros(len(q)), np.zeros(len(q)), np.full(len(q), np.inf)
     step = FIRST_STEP * scale
     for attempt in range(SHRINKINGS + 1):
         try:
-            rate = _difference(reference, q, qd, qdd, mass_model, step)
+            rate = _difference(reference, qpos, q, qd, qdd, mass_model, step)
             break
         except MotionError:
             # a displaced sample beyond the edge of the workspace; the samples themselves were closed before
@@ -182,38 +215,45 @@ def _energy_rate(
                 raise
             step *= 0.5
     best, doubt = rate.copy(), np.full(len(q), np.inf)
-    estimate = rate.copy()
+    estimate, steps = rate.copy(), np.full(len(q), step)
     active = np.arange(len(q))
     for _ in range(HALVINGS):
         step *= 0.5
-        finer = _difference(reference, q[active], qd[active], qdd[active], mass_model, step)
+        finer = _difference(reference, qpos[active], q[active], qd[active], qdd[active], mass_model, step)
         # Richardson: the error of the twelfth-order difference falls by 2^12 with each halving
         refined = finer + (finer - rate[active]) / 4095.0
         gap = np.abs(refined - estimate[active])
         rate[active], estimate[active] = finer, refined
         better = gap < doubt[active]
-        best[active[better]], doubt[active[better]] = refined[better], gap[better]
+        best[active[better]], doubt[active[better]], steps[active[better]] = refined[better], gap[better], step
         # where the gap grows again, rounding has taken over
         active = active[better & (gap > CLOSE_ENOUGH * np.abs(rate).max())]
         if not len(active):
             break
-    return best, doubt
+    return best, doubt, steps
 
 
 def _difference(
-    reference: MujocoReference, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, step: float
+    reference: MujocoReference,
+    qpos: FloatArray,
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+    mass_model: str,
+    step: float,
 ) -> FloatArray:
     """Twelfth-order central difference of the energy along q + qd t + qdd t^2/2."""
     n = len(q)
     times = step * np.array([sign * k for k in range(1, len(WEIGHTS) + 1) for sign in (1, -1)])[:, None, None]
-    # sample after sample, so that the closure starts each from a neighbour
     moved = (q + qd * times + 0.5 * qdd * times**2).swapaxes(0, 1).reshape(-1, q.shape[1])
     speed = (qd + qdd * times).swapaxes(0, 1).reshape(-1, q.shape[1])
     still = np.zeros_like(moved)
     # along the curve excess actuators would leave the mechanism's motions; the leading ones determine its state
     solver, lead = reference.determining
     moved, speed, still = moved[:, lead], speed[:, lead], still[:, lead]
-    energy = solver.inverse_dynamics(moved, speed, still, mass_model).energy.sum(axis=1).reshape(n, len(WEIGHTS), 2)
+    # each from its own sample's configuration: from home another assembly may be on the way
+    found = solver.inverse_dynamics(moved, speed, still, mass_model, near=np.repeat(qpos, len(times), axis=0))
+    energy = found.energy.sum(axis=1).reshape(n, len(WEIGHTS), 2)
     rate: FloatArray = (energy[:, :, 0] - energy[:, :, 1]) @ np.array(WEIGHTS) / step
     return rate
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batches
+from workbench.reference.body_forces import felt_gravity
 from workbench.reference.body_motion import body_motion
 from workbench.reference.mujoco_reference import MujocoReference
 
@@ -57,7 +58,7 @@ def inertial_regressor(reference: MujocoReference, q: ArrayLike, qd: ArrayLike, 
     """
     q, qd, qdd = as_batches(len(reference.joint_names), q=q, qd=qd, qdd=qdd)
     moving = body_motion(reference, q, qd, qdd, centres=False)
-    gravity = np.asarray(reference.compiled().opt.gravity)
+    pulls = felt_gravity(reference.compiled())[1:]
 
     def local(vector: FloatArray) -> FloatArray:
         turned: FloatArray = np.einsum("nbji,nbj...->nbi...", moving.axes, vector)
@@ -65,7 +66,7 @@ def inertial_regressor(reference: MujocoReference, q: ArrayLike, qd: ArrayLike, 
 
     linear, angular, spin = local(moving.linear), local(moving.angular), local(moving.spin)
     still = np.zeros_like(spin)
-    hanging = local(np.broadcast_to(-gravity, spin.shape))
+    hanging = local(np.broadcast_to(-pulls, spin.shape))
     parts = (
         _columns(linear, angular, hanging, still, still),
         _columns(linear, angular, local(moving.linear_driven), local(moving.angular_driven), still),

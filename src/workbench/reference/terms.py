@@ -13,16 +13,22 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.dry_friction import direction
+from workbench.errors import ParameterError
+from workbench.reference.body_forces import felt_gravity
 from workbench.reference.body_motion import BodyMotion, body_motion
 from workbench.reference.mujoco_reference import MujocoReference
 
-WEIGHT, ACCELERATION, VELOCITY, FRICTION, FORCE = "weight", "acceleration", "velocity", "friction", "external force"
-PARTS = (WEIGHT, ACCELERATION, VELOCITY, FRICTION, FORCE)
+WEIGHT, ACCELERATION, VELOCITY = "weight", "acceleration", "velocity"
+SPRINGS, FRICTION, FORCE = "springs", "friction", "external force"
+PARTS = (WEIGHT, ACCELERATION, VELOCITY, SPRINGS, FRICTION, FORCE)
 
 TURNING = "turning"
 JOINTS = "joints"
-"""what stands for a body where the joints themselves need torque: friction, rotor inertia"""
+"""what stands for a body where the joints themselves need torque: springs, friction, fluid, rotor inertia"""
 PLATFORM = "platform"
+
+COMPLETE = 1e-9
+"""Of the largest torque or summand: items that add up to something else by more are refused."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,7 @@ def torque_terms(
     qdd: ArrayLike,
     mass_model: str = "distributed",
     external_force: ArrayLike | None = None,
+    along: ArrayLike | None = None,
 ) -> Terms:
     """Take the torque of each sample apart.
 
@@ -85,33 +92,44 @@ def torque_terms(
         ``"distributed"`` or ``"lumped"``.
     external_force
         Newtons, base (paper) frame, on the platform: ``(3,)`` or ``(n, 3)``.
+    along
+        Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
 
     Raises
     ------
     ParameterError
-        More actuators than freedoms.
+        More actuators than freedoms; a torque with a summand that is none of these.
     MotionError, ArrayError
         As `MujocoReference.inverse_dynamics`.
     """
     q, qd, qdd = as_batches(len(reference.joint_names), q=q, qd=qd, qdd=qdd)
     force = as_force("external_force", external_force, len(q))
-    moving = body_motion(reference, q, qd, qdd, mass_model, force)
+    moving = body_motion(reference, q, qd, qdd, mass_model, force, along=along)
     found = [*_of_bodies(reference, moving, mass_model), *_of_joints(reference, moving, qd, qdd, mass_model)]
     found += _of_force(reference, moving, force)
     kept = tuple(item for item in found if item.tau.any())
-    return Terms(reference.joint_names, kept, moving.result.tau)
+    terms = Terms(reference.joint_names, kept, moving.result.tau)
+    size = max((float(np.abs(tau).max()) for tau in (terms.tau, *(item.tau for item in kept))), default=0.0)
+    left = float(np.abs(terms.total - terms.tau).max()) if terms.tau.size else 0.0
+    if not left <= COMPLETE * size:
+        raise ParameterError(
+            f"{reference.file}: the torque has no parts by body: they leave out {left:.3g} of {size:.3g} N or N m,"
+            " something beside weight, inertia, springs, friction, fluid and the force on the platform"
+        )
+    return terms
 
 
 def _of_bodies(reference: MujocoReference, moving: BodyMotion, mass_model: str) -> list[Item]:
     model = reference.compiled(mass_model)
     turn = reference.base_rotation.T
-    gravity = turn @ np.asarray(model.opt.gravity)
+    pulls = felt_gravity(model) @ turn.T
     items = []
     for index, name in enumerate(moving.names):
         mass = float(model.body_mass[index + 1])
         inertia = np.asarray(model.body_inertia[index + 1])
         linear = np.einsum("cd,nda->nca", turn, moving.linear[:, index])
         driven, carried = moving.linear_driven[:, index] @ turn.T, moving.linear_carried[:, index] @ turn.T
+        gravity = pulls[index + 1]
         for axis, letter in enumerate("xyz"):
             along = mass * linear[:, axis, :]
             items += [
@@ -133,21 +151,25 @@ def _of_bodies(reference: MujocoReference, moving: BodyMotion, mass_model: str) 
 def _of_joints(
     reference: MujocoReference, moving: BodyMotion, qd: FloatArray, qdd: FloatArray, mass_model: str
 ) -> list[Item]:
-    """Rotor inertia, damping of all joints, and dry friction of the actuated ones."""
+    """Rotor inertia, springs, dampers and fluid, and dry friction."""
     model, tangent = reference.compiled(mass_model), moving.tangent
     driven = np.einsum("nva,na->nv", tangent, qdd)
     carried = moving.result.qacc - driven
-    armature, damping = np.asarray(model.dof_armature), np.asarray(model.dof_damping)
+    armature, rub = np.asarray(model.dof_armature), reference.structure.friction
 
     def projected(forces: FloatArray) -> FloatArray:
         tau: FloatArray = np.einsum("nva,nv->na", tangent, forces)
         return tau
 
-    dry = np.asarray(model.dof_frictionloss)[reference.structure.actuated] * direction(qd)
+    dry = rub.actuated * direction(qd)
+    if rub.inside:
+        dry = dry - projected(rub.force(moving.result.qvel))
     return [
         Item(ACCELERATION, JOINTS, "", projected(armature * driven)),
         Item(VELOCITY, JOINTS, "", projected(armature * carried)),
-        Item(FRICTION, JOINTS, "viscous", projected(damping * moving.result.qvel)),
+        Item(SPRINGS, JOINTS, "", -projected(moving.springs)),
+        Item(FRICTION, JOINTS, "viscous", -projected(moving.dampers)),
+        Item(FRICTION, JOINTS, "fluid", -projected(moving.fluid)),
         Item(FRICTION, JOINTS, "dry", dry),
     ]
 
@@ -164,7 +186,7 @@ def _of_force(reference: MujocoReference, moving: BodyMotion, force: FloatArray)
         for joint in range(na):
             rate = rest.copy()
             rate[:, joint] = 1.0
-            jacobian[:, :, joint] = reference.inverse_dynamics(q, rate, rest).xd
+            jacobian[:, :, joint] = reference.inverse_dynamics(q, rate, rest, near=result.qpos).xd
     return [
         Item(FORCE, PLATFORM, letter, -(force @ units[axis])[:, None] * jacobian[:, axis])
         for axis, letter in enumerate("xyz")

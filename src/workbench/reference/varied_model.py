@@ -1,12 +1,15 @@
-"""A model whose parameters are named numbers only: change them in the specification, on every body that is alike.
+"""A model whose parameters are numbers without geometry: change them in the specification, wherever they stand.
 
-A campaign that reads ``m1 = "mass crank1"`` means all cranks when all are alike. So a number is changed wherever the
-model holds the same value in the same kind of place, except where another parameter names that place.
+A robot file says where each parameter stands (``at``), and where it lists several places those are changed and no
+others. Many files name one of several bodies that are alike: ``mass crank1`` means all cranks to a formula that has one
+mass for them. So of a parameter with one place the same number moves along wherever the model holds it in the same kind
+of place, except where another parameter names that place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass
 
 import mujoco
@@ -16,6 +19,7 @@ from workbench.errors import ParameterError
 from workbench.reference.engine import LUMPED_INERTIA
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.robots.load import LoadedModel
+from workbench.robots.parameters import Target
 from workbench.robots.places import AXES
 
 SETTABLE = ("mass", "inertia", "damping", "armature", "gravity")
@@ -27,27 +31,42 @@ ALIKE = 1e-9
 
 @dataclass(frozen=True)
 class Place:
-    """What a parameter of a campaign names: kind, element and axis."""
+    """Where a number of a robot file stands: kind, element and axis."""
 
     kind: str
     element: str
     axis: str = ""
 
     @classmethod
-    def of(cls, text: str) -> Place:
+    def of(cls, target: Target) -> Place:
         """Read ``inertia crank1 y``."""
-        words = text.split()
-        return cls(words[0], words[1] if len(words) > 1 else "", words[2] if len(words) > 2 else "")
+        kind, *names = shlex.split(target.words) or [""]
+        return cls(kind, "", names[0] if names else "") if kind == "gravity" else cls(kind, *names[:2])
 
 
-def settable(read: Mapping[str, str]) -> dict[str, Place]:
-    """Parameters of a campaign that `varied_reference` can change."""
-    return {name: place for name, text in read.items() if (place := Place.of(text)).kind in SETTABLE}
+Targets = Mapping[str, tuple[Target, ...]]
+"""Parameter -> all the numbers that it is in."""
+
+
+def places_of(targets: Iterable[Target]) -> Targets:
+    """Sort the places of a robot file by parameter; those of bars, which follow mass and length, are no places."""
+    found: dict[str, tuple[Target, ...]] = {}
+    for target in targets:
+        if target.words and not target.words.startswith("bar "):
+            for name in dict.fromkeys(target.of):
+                found[name] = (*found.get(name, ()), target)
+    return found
+
+
+def settable(targets: Targets) -> set[str]:
+    """Parameters that `varied_reference` can change: they stand nowhere in the geometry."""
+    return {name for name, every in targets.items() if all(Place.of(target).kind in SETTABLE for target in every)}
 
 
 def varied_reference(
     base: MujocoReference,
-    read: Mapping[str, str],
+    targets: Targets,
+    values: Mapping[str, float],
     changes: Mapping[str, float],
     mass_model: str,
     scale_inertia: bool,
@@ -58,8 +77,10 @@ def varied_reference(
     ----------
     base
         The robot as it is.
-    read
-        The campaign's parameters, name -> place.
+    targets
+        Where the robot's parameters stand.
+    values
+        All of them as they are.
     changes
         New values.
     mass_model
@@ -74,34 +95,24 @@ def varied_reference(
     """
     spec = mujoco.MjSpec.from_string(base.text)
     model = base.compiled(mass_model)
-    places = {name: Place.of(text) for name, text in read.items()}
+    places = {Place.of(target) for every in targets.values() for target in every}
     masses, inertias = np.array(model.body_mass), np.array(model.body_inertia)
-    named_inertia = {body for place in places.values() if place.kind == "inertia" for body in _alike(model, place)}
-    for name, value in changes.items():
-        place = places[name]
-        if place.kind not in SETTABLE:
-            raise ParameterError(f"parameter {name} cannot be set; edit the MJCF, which both sides read")
-        taken = {(p.kind, p.element, p.axis) for other, p in places.items() if other != name}
+    named_inertia = {body for place in places if place.kind == "inertia" for body in _alike(model, place)}
+    for place, value, alone in _numbers(targets, values, changes):
+        taken = {(p.kind, p.element, p.axis) for p in places if p != place}
         if place.kind == "gravity":
-            size = float(np.linalg.norm(spec.option.gravity))
-            spec.option.gravity = np.array(spec.option.gravity) * (value / size if size else 0.0)
-            continue
-        if place.kind in ("damping", "armature"):
-            address = model.jnt_dofadr[model.joint(place.element).id]
-            values = np.array(getattr(model, f"dof_{place.kind}"))
-            for joint in range(model.njnt):
-                other = model.joint(joint).name
-                dof = model.jnt_dofadr[joint]
-                if _same(values[dof], values[address]) and (place.kind, other, "") not in taken:
-                    _set_joint(spec, other, place.kind, value)
-            continue
-        for body in _alike(model, place, taken):
-            if place.kind == "mass":
-                factor = value / masses[body]
+            spec.option.gravity = _gravity(np.array(spec.option.gravity), place.axis, value)
+        elif place.kind in ("damping", "armature"):
+            for joint in _joints(model, place, taken, alone):
+                _set_joint(spec, joint, place.kind, value)
+        elif place.kind == "mass":
+            for body in _alike(model, place, taken) if alone else [model.body(place.element).id]:
+                factor = value / masses[body] if masses[body] else 1.0
                 masses[body] = value
                 if scale_inertia and body not in named_inertia:
                     inertias[body] *= factor
-            else:
+        else:
+            for body in _alike(model, place, taken) if alone else [model.body(place.element).id]:
                 inertias[body] = _turned(model, place, places, body, value, inertias[body])
     for body in range(1, model.nbody):
         element = spec.body(model.body(body).name)
@@ -125,6 +136,43 @@ def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
         raise ParameterError(f"no body can have these numbers: {error}") from error
 
 
+def _numbers(
+    targets: Targets, values: Mapping[str, float], changes: Mapping[str, float]
+) -> Iterator[tuple[Place, float, bool]]:
+    """Places of changed parameters, what has to stand there, and whether no other element holds the parameter alike."""
+    moved, done = {**values, **changes}, set()
+    for name in changes:
+        places = [Place.of(target) for target in targets.get(name, ())]
+        if not places or any(place.kind not in SETTABLE for place in places):
+            raise ParameterError(f"parameter {name} cannot be set; edit the MJCF, which both sides read")
+        for place, target in zip(places, targets[name], strict=True):
+            if place not in done:
+                done.add(place)
+                yield place, target.number(moved), len({p.element for p in places if p.kind == place.kind}) == 1
+
+
+def _gravity(before: np.ndarray, axis: str, value: float) -> np.ndarray:
+    if axis:
+        return np.where(np.arange(3) == AXES.index(axis), value, before)
+    size = float(np.linalg.norm(before))
+    return before * (value / size if size else 0.0)
+
+
+def _joints(model: mujoco.MjModel, place: Place, taken: set[tuple[str, str, str]], alone: bool) -> list[str]:
+    """The named joint, and others with the same number that no parameter names."""
+    values = np.array(getattr(model, f"dof_{place.kind}"))
+    wanted = values[model.jnt_dofadr[model.joint(place.element).id]]
+    names = [model.joint(joint).name for joint in range(model.njnt)] if alone else []
+    alike = [
+        name
+        for name in names
+        if name != place.element
+        and (place.kind, name, "") not in taken
+        and _same(values[model.jnt_dofadr[model.joint(name).id]], wanted)
+    ]
+    return [place.element, *alike]
+
+
 def _set_joint(spec: mujoco.MjSpec, name: str, kind: str, value: float) -> None:
     joint = spec.joint(name)
     if kind == "damping":
@@ -146,7 +194,7 @@ def _moment(model: mujoco.MjModel, place: Place) -> float:
 
 
 def _turned(
-    model: mujoco.MjModel, place: Place, places: Mapping[str, Place], body: int, value: float, principal: np.ndarray
+    model: mujoco.MjModel, place: Place, places: Set[Place], body: int, value: float, principal: np.ndarray
 ) -> np.ndarray:
     """Principal inertias with those that equal the named moment moved to *value*.
 
@@ -157,11 +205,11 @@ def _turned(
     if not mine.any():
         raise ParameterError(f"inertia {place.element} {place.axis}: no principal axis of the body")
     factor = value / before
-    moved = np.where(mine, principal * factor, principal)
+    moved = np.where(mine, model.body_inertia[body] * factor, principal)  # a second axis does not move twins twice
     if 2 * moved.max() > moved.sum() * (1 + 1e-12):
-        others = [_moment(model, p) for p in places.values() if p.kind == "inertia" and p != place]
+        others = [_moment(model, p) for p in places if p.kind == "inertia" and p != place]
         named = np.array([any(_same(m, other) for other in others) for m in model.body_inertia[body]]) & ~mine
-        moved = np.where(named, principal, principal * factor)
+        moved = np.where(named, principal, model.body_inertia[body] * factor)
     return moved
 
 

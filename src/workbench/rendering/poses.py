@@ -45,7 +45,8 @@ def home_pose(path: Path) -> Poses:
     """
     loaded = open_model(path)
     try:
-        qpos = LoopCloser(Engine(loaded.model), read_structure(loaded.model, loaded.file)).home
+        structure = read_structure(loaded.model, loaded.file)
+        qpos = LoopCloser(Engine(loaded.model, frames=structure.frames), structure).home
     except WorkbenchError:
         model = loaded.model
         home = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, "home")
@@ -91,5 +92,5 @@ def motion_poses(
         )
     times = start + step * np.arange(int(count) + 1, dtype=np.float64)
     reference = found.robot.reference
-    qpos = reference.inverse_dynamics(*course_of(found)(times)).qpos
+    qpos = reference.inverse_dynamics(*course_of(found)(times), along=times).qpos
     return Poses(reference.text, reference.compiled(), qpos, times, f"{path}, {found.name}")

@@ -123,6 +123,8 @@ class PowerRecord(Record):
     worst_time_s: float | None = None
     differentiation: float | None = None
     """how well the energy's derivative is known, over peak power"""
+    rounding: float | None = None
+    """what rounding alone may leave of the balance, over peak power"""
     samples: int | None = None
 
 
@@ -160,6 +162,8 @@ class EvidenceRecord(Record):
     """What the reference itself is worth in one case."""
 
     power_balance: dict[str, PowerRecord] = {}
+    undetermined: dict[str, dict[str, float | None]] = {}
+    """what the model leaves open, of each peak torque: mass model -> joint"""
     second_engine: EngineRecord | None = None
     replay: ReplaySetRecord | None = None
 

@@ -13,7 +13,7 @@ from workbench.report.style import PALETTE
 from workbench.report.tables import Cell, Table, columns
 from workbench.report.text import exact, pretty_unit
 
-PARTS = ("weight", "acceleration", "velocity", "friction", "external force")
+PARTS = ("weight", "acceleration", "velocity", "springs", "friction", "external force")
 """In the order in which they are stacked."""
 
 
@@ -73,5 +73,6 @@ def spent_table(run: Run, record: CaseRecord, anchor: str) -> Table:
         columns(["Item", "Of", *titles], titles),
         tuple(rows),
         "root mean squares over the case. Parts add up to the torque at every moment, and so do bodies; their root mean"
-        " squares do not. “joints” are friction and rotor inertia, “platform” as a body also takes the external force.",
+        " squares do not. “joints” are springs, friction and rotor inertia, “platform” as a body also takes the"
+        " external force.",
     )
