@@ -19,7 +19,7 @@ PACKAGE = "workbench"
 MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("cli", "commands", "console"),
+    ("__main__", "cli", "commands", "console"),
     ("report", "compare", "rendering"),
     ("sweep",),
     ("campaign", "workspace"),
@@ -37,6 +37,9 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "errors",
         "data_files",
         "limits",
+        "processes",
+        "shielded",
+        "plotting",
         "_version",
     ),
 )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.campaign import provenance
+from workbench.campaign.commit import git_commit
 from workbench.campaign.spec import Campaign
 from workbench.robots.base import Mechanism
 from workbench.robots.parameters import stored_names
@@ -46,5 +47,5 @@ def describe(campaign: Campaign, file: Path, model: Path, mechanism: Mechanism) 
         ],
         "versions": provenance.versions(),
         "machine": provenance.machine(),
-        "git_commit": provenance.git_commit(file.resolve().parent),
+        "git_commit": git_commit(file.resolve().parent),
     }

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
-import sys
 import tempfile
 import threading
 from pathlib import Path
@@ -14,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from workbench import processes
 from workbench.arrays import FloatArray
 from workbench.campaign import store
 from workbench.campaign.compare import CaseResult
@@ -92,14 +91,15 @@ class RunPictures:
     def _draw(self, folder: Path) -> None:
         """Try one OpenGL after the other: a machine that can draw needs one process, others some that fail fast."""
         tried = backends()
-        command = [sys.executable, "-m", film_worker.__name__, str(folder), *map(str, (WIDTH, HEIGHT, COLUMNS))]
+        command = processes.python_module(film_worker.__name__, str(folder), *map(str, (WIDTH, HEIGHT, COLUMNS)))
         for backend in tried:
             if self._over:
                 return
             try:
                 self._process = popen(
                     command,
-                    env={**os.environ, "MUJOCO_GL": backend},
+                    env=processes.environment(MUJOCO_GL=backend),
+                    cwd=folder,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.DEVNULL,
