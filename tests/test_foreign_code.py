@@ -149,7 +149,7 @@ def test_watching_runs_nothing_either(trapped: Path) -> None:
             said.append(line)
             if line.startswith("watching"):
                 process.send_signal(signal.SIGINT)
-        assert process.wait(60) == 0, said
+        assert process.wait(60) in (0, 130), said  # 130: interrupted before it had begun to wait
     assert any("within their bounds" in line for line in said), said
     assert list((trapped / "marks").iterdir()) == []
 
