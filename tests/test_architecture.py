@@ -38,6 +38,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "data_files",
         "limits",
         "processes",
+        "file_lock",
+        "scratch",
         "shielded",
         "plotting",
         "_version",

@@ -11,8 +11,9 @@ import os
 import re
 import shutil
 import subprocess
-import tempfile
 from pathlib import Path
+
+from workbench.scratch import scratch_directory
 
 LONGEST = 10_000_000
 """Bytes of a file of references that is still read."""
@@ -89,14 +90,13 @@ def _unchanged(top: Path, private: Path, shared: Path, commit: str) -> bool:
     git = shutil.which("git")
     if git is None or Path(git).resolve().is_relative_to(top):
         return False
-    with tempfile.TemporaryDirectory(prefix="workbench_") as folder:
-        own = Path(folder)
+    with scratch_directory() as own:
         (own / "refs").mkdir()
         (own / "HEAD").write_text(f"{commit}\n", encoding="utf-8")
         version = "1\n[extensions]\n\tobjectformat = sha256" if len(commit) == SHA256_DIGITS else "0"
         (own / "config").write_text(f"[core]\n\trepositoryformatversion = {version}\n", encoding="utf-8")
         environment = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")} | {
-            "GIT_DIR": folder,
+            "GIT_DIR": str(own),
             "GIT_WORK_TREE": str(top),
             "GIT_INDEX_FILE": str(private / "index"),
             "GIT_OBJECT_DIRECTORY": str(shared / "objects"),

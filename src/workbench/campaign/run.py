@@ -121,7 +121,11 @@ def run_campaign(
     check_engines(effort.engines)
     cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users)
     results: list[CaseResult] = []
-    with locked(directory), staged(directory) as stage, closing(pictures) if pictures else nullcontext():
+    with (
+        locked(directory),
+        staged(directory, alone=True) as stage,
+        closing(pictures) if pictures else nullcontext(),
+    ):
         for number, case in enumerate(cases):
             if progress:
                 progress(case.name, number, len(cases))

@@ -33,6 +33,7 @@ def workspace(
 ) -> None:
     """Compute the reachable workspace by discretisation: volume with its error, cells as Parquet, figures."""
     from workbench.campaign.cases import layered, resolve_cases
+    from workbench.campaign.lock import locked
     from workbench.campaign.spec import load_campaign
     from workbench.console import print_workspace
     from workbench.report.workspace import draw_workspace
@@ -54,7 +55,7 @@ def workspace(
         spec, file = load_campaign(campaign)
         paths = {case.name: case.x for case in resolve_cases(spec, file, model)}
     computed = compute_workspace(mechanism, grid, ranges(limit or []))
-    with staged(directory) as stage:
+    with locked(directory), staged(directory, alone=True) as stage:
         write_workspace(stage, computed, mechanism)
         draw_workspace(stage, paths)
     print_workspace(workspace_facts(computed, mechanism), directory)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import subprocess
-import tempfile
 from collections.abc import Iterator
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -16,6 +14,7 @@ from workbench.errors import ModelError, OutputError, ParameterError, did_you_me
 from workbench.rendering import worker
 from workbench.rendering.poses import Poses
 from workbench.rendering.system import offscreen_backend
+from workbench.scratch import scratch_directory
 
 Picture = NDArray[np.uint8]
 """``(height, width, 3)`` red, green, blue"""
@@ -52,12 +51,12 @@ def draw(poses: Poses, width: int, height: int, camera: str | None = None) -> It
             raise ParameterError(f"{name} {value} pixels; allowed: {SIDES[0]} to {SIDES[1]}", value=value)
     view = _camera(poses.model, camera)
     backend = offscreen_backend()
-    with tempfile.TemporaryDirectory(prefix="workbench_") as folder:
-        (Path(folder) / worker.MODEL).write_text(poses.text, encoding="utf-8")
-        np.save(Path(folder) / worker.POSES, poses.qpos)
-        command = processes.python_module(worker.__name__, folder, str(width), str(height), view)
+    with scratch_directory() as folder:
+        (folder / worker.MODEL).write_text(poses.text, encoding="utf-8")
+        np.save(folder / worker.POSES, poses.qpos)
+        command = processes.python_module(worker.__name__, str(folder), str(width), str(height), view)
         with (
-            open(Path(folder) / "log", "w+", encoding="utf-8", errors="replace") as log,
+            open(folder / "log", "w+", encoding="utf-8", errors="replace") as log,
             subprocess.Popen(
                 command,
                 env=processes.environment(MUJOCO_GL=backend),
