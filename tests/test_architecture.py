@@ -38,10 +38,13 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "data_files",
         "limits",
         "processes",
+        "reading",
         "file_lock",
         "scratch",
         "shielded",
         "plotting",
+        "schema",
+        "documents",
         "_version",
     ),
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -13,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.errors import OutputError
+from workbench.reading import read_json
 
 IGNORED = (".DS_Store", "Thumbs.db", "desktop.ini")
 """files that file managers leave everywhere"""
@@ -89,7 +89,7 @@ def _check_existing(directory: Path, place: Path, kind: DirectoryKind) -> None:
 def _is_ours(marker: Path, kind: DirectoryKind) -> bool:
     """Tell our marker from other files of that common name."""
     try:
-        content = json.loads(marker.read_text(encoding="utf-8"))
+        content = read_json(marker)
     except (OSError, ValueError):
         return False
     return isinstance(content, dict) and kind.keys <= content.keys()

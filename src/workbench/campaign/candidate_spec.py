@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
-from workbench.campaign.schema import Finite, Strict
+from workbench.schema import Finite, Strict
 
 if TYPE_CHECKING:
     from workbench.campaign.spec import CaseSpec

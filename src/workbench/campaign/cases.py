@@ -20,10 +20,10 @@ from workbench.campaign.spec import (
     CycleMotion,
     MultiSineMotion,
     SineMotion,
-    shorten,
 )
 from workbench.campaign.user_candidates import UserCandidate, offer
 from workbench.data_files import bundled, bundled_names
+from workbench.documents import shorten
 from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
 from workbench.mjcf.setup import Setup
 from workbench.motion import (

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from workbench.campaign.schema import Finite, Name, Strict
+from workbench.schema import Finite, Name, Strict
 
 CANDIDATE_CURVE = "cand:"
 

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from workbench.campaign.schema import Finite, Strict
 from workbench.mjcf.setup import Setup
+from workbench.schema import Finite, Strict
 
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,39}$")]
 

@@ -6,26 +6,23 @@ lie beside it.
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
 from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
 from workbench.campaign.own_mechanism import OwnMechanism
-from workbench.campaign.schema import NAME_RULE, Finite, Name, Strict, Triple, Vector
 from workbench.campaign.sweep_spec import Filter, SweepSpec, Vary
 from workbench.data_files import bundled
+from workbench.documents import Form, read_toml, shorten
 from workbench.errors import SpecError, WorkbenchError, did_you_mean
+from workbench.schema import Finite, Name, Strict, Triple, Vector
 
 FORMAT = 1
 MAX_SAMPLES = 100_000
 """Samples of one case: the reference holds some 20 kB of matrices for each while it computes."""
-
-SHOWN = 60
-"""Longest piece of a campaign's text that a message repeats."""
 
 Samples = Annotated[int, Field(le=MAX_SAMPLES)]
 
@@ -196,21 +193,11 @@ def load_campaign(path: str | Path) -> tuple[Campaign, Path]:
         names file, key, value and what is allowed.
     """
     found = _find(Path(path))
-    try:
-        # -sig: some editors begin UTF-8 files with a byte order mark
-        document = tomllib.loads(found.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise SpecError(f"{path}: {error.strerror or error}", file=str(path)) from error
-    except UnicodeDecodeError as error:
-        raise SpecError(f"{path}: not UTF-8 text (byte {error.start})", file=str(path)) from error
-    except tomllib.TOMLDecodeError as error:
-        raise SpecError(f"{path}: not valid TOML: {error}", file=str(path)) from error
-    except RecursionError as error:
-        raise SpecError(f"{path}: not valid TOML: nested too deeply", file=str(path)) from error
+    document = read_toml(found, str(path))
     try:
         campaign = Campaign.model_validate(document)
     except ValidationError as error:
-        raise SpecError(f"{path}: {_first(error, document)}", file=str(path)) from error
+        raise SpecError(f"{path}: {FORM.problem(error, document)}", file=str(path)) from error
     _check_names(campaign, str(path))
     return campaign, found
 
@@ -231,79 +218,15 @@ def _find(path: Path) -> Path:
     raise SpecError(f"{path}: no such campaign file", file=str(path))
 
 
-def _first(error: ValidationError, document: dict[str, Any]) -> str:
-    """One line for the first thing that pydantic found: key, what is wrong, value, what is allowed."""
-    # an unknown key explains a missing one, so it goes first
-    issue = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-    place = [part for part in issue["loc"] if part not in _TAGS]
-    where = _place(place, document)
-    if issue["type"] == "extra_forbidden":
-        key = str(place[-1])
-        return f"{where}: unknown key{did_you_mean(key, _valid_keys(issue['loc']))}"
-    if issue["type"] == "missing":
-        return f"{where}: missing; this key is required"
-    if issue["type"].startswith("union_tag"):
-        return f"{where}.kind{_wrong_kind(issue['input'])}"
-    if issue["type"] == "string_pattern_mismatch":
-        return f"{where} = {shorten(repr(issue['input']))}; {NAME_RULE}"
-    if issue["type"] in ("model_type", "dict_type"):
-        section = _SECTIONS.get(str(place[-1]))
-        keys = f" with the keys {', '.join(section.model_fields)}" if section else ""
-        return f"{where} = {shorten(repr(issue['input']))}: should be a table{keys}"
-    message = issue["msg"].removeprefix("Value error, ").removeprefix("Input ")
-    # a whole table or list says less than its key
-    shown = "" if isinstance(issue["input"], dict | list) else f" = {shorten(repr(issue['input']))}"
-    return f"{where}{shown}: {message[0].lower()}{message[1:]}"
-
-
-def _wrong_kind(motion: Any) -> str:
-    if not isinstance(motion, dict):
-        return ": missing; a motion is a table with kind and its own keys"
-    if "kind" not in motion:
-        return f": missing; valid: {', '.join(_MOTIONS)}"
-    kind = str(motion["kind"])
-    return f" = {shorten(repr(kind))}: unknown kind of motion{did_you_mean(kind, _MOTIONS)}"
-
-
-def shorten(text: str) -> str:
-    """Cut a text that a message repeats."""
-    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
-
-
-_MOTIONS: dict[str, type[Strict]] = {
-    "sine": SineMotion, "multi_sine": MultiSineMotion, "pick_and_place": CycleMotion, "csv": CsvMotion,
-}  # fmt: skip
-_TAGS = frozenset({*_MOTIONS, "float", "constrained-float"})
-_SECTIONS: dict[str, type[Strict]] = {
-    "candidate": CandidateSpec, "case": CaseSpec, "claim": ClaimSpec, "figure": FigureSpec, "measure": Measure,
-    "sweep": SweepSpec, "vary": Vary, "filter": Filter, "printed_cost": PrintedCost,
-}  # fmt: skip
-
-
-def _valid_keys(place: tuple[int | str, ...]) -> list[str]:
-    """Keys that are valid beside the one at *place*."""
-    model: type[Strict] = Campaign
-    for part in place[:-1]:
-        model = _MOTIONS.get(str(part), _SECTIONS.get(str(part), model))
-    return list(model.model_fields)
-
-
-def _place(place: list[int | str], document: Any) -> str:
-    """``case "simulation_1".motion.stop``: the key's path with names in place of numbers where there are names."""
-    text, node = "", document
-    for part in place:
-        try:
-            node = node[part]
-        except (KeyError, IndexError, TypeError):
-            node = None
-        if isinstance(part, int):
-            name = next(
-                (node[k] for k in ("name", "id") if isinstance(node, dict) and isinstance(node.get(k), str)), ""
-            )
-            text += f' "{shorten(name)}"' if name else f"[{part + 1}]"
-        else:
-            text += f".{part}" if text else str(part)
-    return text
+FORM = Form(
+    Campaign,
+    sections={
+        "candidate": CandidateSpec, "case": CaseSpec, "claim": ClaimSpec, "figure": FigureSpec, "measure": Measure,
+        "sweep": SweepSpec, "vary": Vary, "filter": Filter, "printed_cost": PrintedCost,
+    },
+    kinds={"sine": SineMotion, "multi_sine": MultiSineMotion, "pick_and_place": CycleMotion, "csv": CsvMotion},
+    kinds_of="motion",
+)  # fmt: skip
 
 
 def _check_names(campaign: Campaign, file: str) -> None:

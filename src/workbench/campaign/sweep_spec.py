@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from workbench.campaign.schema import Finite, Strict
+from workbench.schema import Finite, Strict
 
 MAX_CASES = 1_000_000
 """A sweep with more cases is taken for a slip: a grid grows by a factor with every value that varies."""

@@ -28,11 +28,11 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.campaign.candidate_spec import CandidateSpec
-from workbench.campaign.schema import NAME, NAME_RULE
 from workbench.campaign.spec import Campaign
 from workbench.errors import CandidateError, SpecError, did_you_mean
 from workbench.robots.base import Candidate, Mechanism
 from workbench.robots.registration import MARK, Registration
+from workbench.schema import NAME, NAME_RULE
 
 LIMIT_S = 60.0
 """Longest time that one call may take before it is stopped, where the system can (not in threads, not on Windows)."""

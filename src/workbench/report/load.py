@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +18,11 @@ from pydantic import ValidationError
 
 from workbench.arrays import FloatArray
 from workbench.errors import OutputError
+from workbench.reading import parse_json, read_bytes
 from workbench.report.manifest import FORMAT_VERSION, Manifest, Record
+
+LARGEST_SERIES = 500_000_000
+"""Bytes of one case's time series that are read."""
 
 UNFINISHED = "journal.jsonl"
 """Holds the cases of a sweep while it runs, or after it was stopped."""
@@ -88,7 +91,8 @@ class Run:
             raise OutputError(f"{self.directory}: case {case!r} cannot be a file name; allowed: one path component")
         try:
             # read_table of a Python file leaves threads behind that abort an interpreter which ends soon after
-            table = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(path.read_bytes())).read(use_threads=False)
+            buffer = pyarrow.BufferReader(read_bytes(path, LARGEST_SERIES))
+            table = pyarrow.parquet.ParquetFile(buffer).read(use_threads=False)
             columns = {name: _floats(table.column(name)) for name in table.column_names}
         except FileNotFoundError as error:
             raise OutputError(f"{path}: missing, though manifest.json lists case {case!r} as computed") from error
@@ -154,12 +158,12 @@ def read_text(path: Path) -> str:
         It is missing or cannot be read.
     """
     try:
-        return path.read_text(encoding="utf-8")
+        return read_bytes(path).decode("utf-8")
     except FileNotFoundError as error:
         held = "a run directory holds manifest.json and summary.csv, or sweep.json in place of it"
         raise OutputError(f"{path}: missing; {held}") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise OutputError(f"{path}: cannot be read ({short(error)})") from error
+        raise OutputError(f"{path}: cannot be read ({reason(error)})") from error
 
 
 RecordType = TypeVar("RecordType", bound=Record)
@@ -174,7 +178,7 @@ def read_record(path: Path, kind: type[RecordType], version: int) -> RecordType:
         One line that names the file, the key and the value: missing, torn, of another format, or a wrong entry.
     """
     try:
-        data = json.loads(read_text(path))
+        data = parse_json(read_text(path))
     except ValueError as error:
         raise OutputError(f"{path}: not valid JSON ({short(error)})") from error
     found = data.get("format") if isinstance(data, dict) else None
@@ -259,6 +263,11 @@ def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
         normaliser=number("normaliser" if record.get("normaliser") else "peak_reference"),
         uncertainty=number("uncertainty") if record.get("uncertainty", "").strip() else math.nan,
     )
+
+
+def reason(error: BaseException) -> str:
+    """Return what the system, or a decoder, says about a file, without the file's name."""
+    return (isinstance(error, OSError) and error.strerror) or short(error)
 
 
 def short(error: BaseException) -> str:

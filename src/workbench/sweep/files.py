@@ -18,6 +18,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from workbench import reading
 from workbench.campaign import store
 from workbench.campaign.compare import Row
 from workbench.staging import DirectoryKind
@@ -86,7 +87,7 @@ def write_bytes(path: Path, content: bytes) -> None:
 def read_json(path: Path) -> dict[str, Any] | None:
     """Return a JSON file's content; None where it is missing or torn."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = reading.read_json(path)
     except (OSError, ValueError):
         return None
     return content if isinstance(content, dict) else None

@@ -6,8 +6,9 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from workbench.campaign.spec import Campaign, shorten
+from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate
+from workbench.documents import shorten
 from workbench.errors import SpecError
 from workbench.sweep.plan import DIGITS, Plan, plan_sweep
 

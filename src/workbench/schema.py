@@ -1,4 +1,4 @@
-"""What every part of a campaign file is made of: strict tables, finite numbers, names that may become file names."""
+"""What campaign and robot files are made of: strict tables, finite numbers, names that may become file names."""
 
 from __future__ import annotations
 
