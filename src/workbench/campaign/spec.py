@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
@@ -24,14 +24,30 @@ FORMAT = 1
 MAX_SAMPLES = 100_000
 """Samples of one case: the reference holds some 20 kB of matrices for each while it computes."""
 
+Term = Annotated[list[Finite], Field(min_length=2, max_length=3)]
+"""Amplitude, frequency and, where it is given, phase."""
+
+MAX_TERMS = 1000
+"""Sinusoids of one joint."""
+
+Moment = Annotated[Finite, Field(ge=-1e6, le=1e6)]
+"""Seconds; beyond some weeks the phase of a sinusoid is no longer known to all digits."""
+
 Samples = Annotated[int, Field(le=MAX_SAMPLES)]
+
+
+def no_boolean(value: object) -> object:
+    """Refuse true where 1 is meant: Python takes the one for the other."""
+    if isinstance(value, bool):
+        raise ValueError("should be a number")
+    return value
 
 
 class Window(Strict):
     """When a motion is sampled: seconds, and either a number of samples or a rate in hertz."""
 
-    start: Finite = 0.0
-    stop: Finite
+    start: Moment = 0.0
+    stop: Moment
     samples: Samples | None = None
     rate: Finite | None = None
 
@@ -59,7 +75,9 @@ class MultiSineMotion(Window):
 
     kind: Literal["multi_sine"]
     offset: Vector
-    terms: list[list[Annotated[list[Finite], Field(min_length=2, max_length=3)]]]
+    terms: list[
+        Annotated[list[Annotated[list[Finite], Field(min_length=2, max_length=3)]], Field(max_length=MAX_TERMS)]
+    ]
 
 
 class CycleMotion(Strict):
@@ -153,7 +171,7 @@ class ClaimSpec(Strict):
 class Campaign(OwnMechanism):
     """A whole campaign file."""
 
-    format: Literal[1] = 1
+    format: Annotated[Literal[1], BeforeValidator(no_boolean)] = 1
     name: Name
     title: str
     description: str = ""

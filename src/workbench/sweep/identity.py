@@ -68,7 +68,9 @@ def common_key(
             "keep_series": keep_series,
             "setup": repr(campaign.setup),
             "read": campaign.read,
-            "users": {user.name: provenance.sha256(user.file.read_bytes()) for user in users},
+            "users": {
+                user.name: provenance.sha256(b"".join(file.read_bytes() for file in user.files)) for user in users
+            },
         }
     )
 
