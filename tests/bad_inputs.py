@@ -407,7 +407,6 @@ def options() -> Iterator[Bad]:
         "tls://127.0.0.1:1",
         "tcp://127.0.0.1:99999999",
         "ucx://a:1",
-        "",
         "inproc://x",
         "http://a",
         "\udcff",
@@ -444,7 +443,7 @@ def options() -> Iterator[Bad]:
     for command in ("report", "status", "compare"):
         for place in ("nowhere", "", "good.toml", "/dev/null", "a\0b", "\udcff", "a" * 5000, "."):
             yield Bad(f"{command} {place[:20]!a}", (command, place, *(("run",) if command == "compare" else ())), good)
-    for value in ("a/b", "", "..", "a\0b", "\udcff", "a" * 5000, "-"):
+    for value in ("", "..", "a\0b", "\udcff", "a" * 5000, "-"):
         yield Bad(f"new {value[:20]!a}", ("new", "--", value), good, "")
     for arguments in (("run",), ("rum",), ("run", "a", "b"), ("run", "good.toml", "--nobody"), ("model",), ("model", "nobody"), ("compare", "run"), ("status",), ("report",), ("workspace",),
                       ("run", "nobody"), ("run", ""), ("run", "\udcff.toml"), ("run", "a\0b"), ("run", "/dev/zero"), ("run", "/dev/null"), ("run", "/proc/self/mem"), ("watch", "nobody.toml"), ("watch",),

@@ -39,6 +39,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "limits",
         "processes",
         "reading",
+        "records",
         "file_lock",
         "scratch",
         "shielded",

@@ -6,7 +6,9 @@ Exit code 0: every bound holds; 1: a bound fails; 2: bad input; 3: a fault of th
 
 from __future__ import annotations
 
+import io
 import os
+import re
 import signal
 import sys
 import threading
@@ -44,6 +46,10 @@ SIGNALLED = 128
 """plus the number of the signal that ended a command"""
 BROKEN_PIPE = 141
 
+SHOWN = 200
+LONG_WORD = re.compile(r"\S{600,}")
+"""Nobody reads these to their end: a line of a message stays a line."""
+
 TRACEBACK = "WORKBENCH_TRACEBACK"
 """environment variable: when set, a fault of the workbench itself shows its traceback"""
 
@@ -80,6 +86,9 @@ def main() -> NoReturn:
     """Run the command line; whatever goes wrong becomes one line and an exit code."""
     if _notice not in subscribers:
         subscribers.append(_notice)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # names of files may hold what is no text
+            stream.reconfigure(errors="backslashreplace")
     with _asked_to_end() as asked:
         code = _run(sys.argv[1:] or ["--help"], asked)
     sys.exit(code)
@@ -138,7 +147,8 @@ def _run(arguments: list[str], asked: Sequence[int] = ()) -> int:
 
 def _complain(what: object, code: int) -> int:
     message = what.format_message() if hasattr(what, "format_message") else str(what)
-    typer.echo(f"workbench: {' '.join(message.split())}", err=True)
+    line = LONG_WORD.sub(lambda word: f"{word[0][:SHOWN]}...", " ".join(message.split()))
+    typer.echo(f"workbench: {line}", err=True)
     return code
 
 

@@ -21,7 +21,7 @@ from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.campaign.user_candidates import UserCandidate, load_candidates, with_rows
-from workbench.errors import SpecError, WorkbenchError
+from workbench.errors import OutputError, SpecError, WorkbenchError
 from workbench.staging import check_output, staged
 
 
@@ -151,9 +151,24 @@ def run_campaign(
         store.write_manifest(stage, manifest)
         if pictures:
             pictures.finish(stage)
-        if report:
-            report(stage)
+        failure = _report(report, stage) if report else None
+    if failure is not None:
+        said = f"{failure}" if isinstance(failure, WorkbenchError) else f"{type(failure).__name__}: {failure}"
+        raise OutputError(
+            f"{directory}: the results stand there, its report could not be written:"
+            f" {said.replace(str(stage), str(directory))}; workbench report {directory} tries again",
+            path=str(directory),
+        ) from failure
     return Outcome(directory, passed, rows, manifest)
+
+
+def _report(report: Callable[[Path], object], stage: Path) -> Exception | None:
+    """Write the report; what is wrong with it must not cost the results, which may have taken hours."""
+    try:
+        report(stage)
+    except Exception as error:
+        return error
+    return None
 
 
 def compute_named_case(campaign: Campaign, case: Case, file: Path, effort: Effort) -> CaseResult:

@@ -36,6 +36,8 @@ def settings(assignments: Iterable[str]) -> tuple[dict[str, float], list[str]]:
             relative.append(assignment)
         else:
             try:
+                if "_" in value:
+                    raise ValueError  # Python reads 1_000 as a number; here it is a slip
                 found[name] = float(value)
             except ValueError:
                 raise ParameterError(f'--set "{assignment}": expected {SETTING}') from None
