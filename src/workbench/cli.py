@@ -34,7 +34,6 @@ app = typer.Typer(
     name="workbench",
     help="Validate closed-form dynamics of parallel robots against MuJoCo.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )

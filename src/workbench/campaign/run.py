@@ -58,9 +58,9 @@ Pick = Callable[[Campaign, Path, Path | None, Mapping[str, float], Sequence[str]
 
 def run_campaign(
     path: str | Path,
-    out: Path | None = None,
+    out: str | Path | None = None,
     *,
-    model: Path | None = None,
+    model: str | Path | None = None,
     only: Sequence[str] = (),
     settings: Mapping[str, float] | None = None,
     relative: Sequence[str] = (),
@@ -110,7 +110,12 @@ def run_campaign(
     """
     started, clock = datetime.now(UTC), time.perf_counter()
     campaign, file = load_campaign(path)
-    directory = out or Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
+    model = None if model is None else Path(model)
+    directory = (
+        Path(out)
+        if out is not None
+        else Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
+    )
     users = load_candidates(candidates)
     campaign = with_rows(campaign, users)
     if campaign.sweep:

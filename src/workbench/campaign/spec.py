@@ -15,7 +15,7 @@ from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
 from workbench.campaign.own_mechanism import OwnMechanism
 from workbench.campaign.sweep_spec import Filter, SweepSpec, Vary
-from workbench.data_files import bundled
+from workbench.data_files import bundled, bundled_names
 from workbench.documents import Form, read_toml, shorten
 from workbench.errors import SpecError, WorkbenchError, did_you_mean
 from workbench.schema import Finite, Name, Strict, Triple, Vector
@@ -220,6 +220,11 @@ def load_campaign(path: str | Path) -> tuple[Campaign, Path]:
     return campaign, found
 
 
+def campaign_names() -> tuple[str, ...]:
+    """Names of the campaigns that come with the package."""
+    return tuple(name.removesuffix(".toml") for name in bundled_names("campaigns"))
+
+
 def _find(path: Path) -> Path:
     try:
         if path.is_file():
@@ -233,7 +238,8 @@ def _find(path: Path) -> Path:
             return bundled("campaigns", path.name)
         except WorkbenchError:
             pass
-    raise SpecError(f"{path}: no such campaign file", file=str(path))
+    named = f"; those that come along: {', '.join(campaign_names())}" if len(path.parts) <= 1 else ""
+    raise SpecError(f"{path}: no such campaign file{named}", file=str(path))
 
 
 FORM = Form(

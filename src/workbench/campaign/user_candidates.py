@@ -14,6 +14,7 @@ import traceback
 from collections import ChainMap
 from collections.abc import Iterable
 from contextlib import nullcontext
+from dataclasses import fields, is_dataclass
 from functools import partial
 from pathlib import Path
 from types import CodeType
@@ -26,7 +27,7 @@ from workbench.campaign.bounded_call import TooSlow, UnrulyError, bounded, said
 from workbench.campaign.candidate_spec import LARGEST_BOUND, CandidateSpec
 from workbench.campaign.formula_files import Siblings, load_module
 from workbench.campaign.spec import Campaign
-from workbench.errors import CandidateError, SpecError
+from workbench.errors import CandidateError, SpecError, did_you_mean
 from workbench.robots.base import Candidate, Mechanism
 from workbench.robots.registration import MARK, Registration
 from workbench.schema import NAME, NAME_RULE
@@ -93,7 +94,9 @@ class UserCandidate:
             found = bounded(lambda: self._call(mechanism.parameters, given, q.shape), LIMIT_S)
         except UnrulyError as trouble:
             what = f"{trouble} for {len(q)} samples" if isinstance(trouble.error, TooSlow) else str(trouble)
-            raise self._fault(what, trouble.error) from trouble.error
+            raise self._fault(
+                what + _valid_names(trouble.error, mechanism.parameters), trouble.error
+            ) from trouble.error
         self._taken.append((time.perf_counter() - begun) / max(len(q), 1))
         return self._checked(found, q.shape, mechanism.joints)
 
@@ -137,6 +140,14 @@ class UserCandidate:
             if Path(frame.filename) == self.file:
                 line = f"{self.file.name}:{frame.lineno}"
         return CandidateError(f'candidate "{self.name}" ({line}) {what}', candidate=self.name, line=line, **facts)
+
+
+def _valid_names(error: BaseException, parameters: Any) -> str:
+    """Return the names that the parameters have, where a formula has asked for another one."""
+    if not isinstance(error, AttributeError) or error.obj is not parameters or not is_dataclass(parameters):
+        return ""
+    names = {part for one in fields(parameters) for part in (one.name, re.sub("_(left|right)$", "", one.name))}
+    return did_you_mean(error.name or "", names)
 
 
 def _sealed(array: FloatArray) -> FloatArray:

@@ -10,6 +10,10 @@ import typer
 CampaignArgument = Annotated[
     Path, typer.Argument(metavar="CAMPAIGN", help="Campaign file (TOML), or the name of one that comes along.")
 ]
+CampaignOrNone = Annotated[
+    Path | None,
+    typer.Argument(metavar="CAMPAIGN", help="Campaign file (TOML), or the name of one that comes along; none: a list."),
+]
 SetInCases = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI; a2*=1.1 scales."),

@@ -96,16 +96,17 @@ def dry_run(
     effort: Effort,
     jobs: int | None,
     candidates: Sequence[str | Path] = (),
+    only: Sequence[str] = (),
 ) -> None:
     """Print what a run would take; nothing is written."""
     check_engines(effort.engines)
-    found = estimate(campaign, file, model, settings, effort, jobs, candidates)
+    found = estimate(campaign, file, model, settings, effort, jobs, candidates, only)
     out.print(Text(f"{campaign.name}: {found.cases} cases, {found.samples} samples"))
     workers = "worker" if found.jobs == 1 else "workers"
     out.print(Text(f"  time: about {duration(found.seconds)} with {found.jobs} {workers}"))
-    running = f", {size(found.bytes_while_running)} while it runs" if campaign.sweep else ""
+    running = f", {size(found.bytes_while_running)} while it runs" if campaign.sweep and not only else ""
     out.print(Text(f"  disk: about {size(found.bytes_at_end)}{running}"))
-    if campaign.sweep:
+    if campaign.sweep and not only:
         parts = [f"{found.tried_filtered} left out by the filter", f"{found.tried_failed} not passed"]
         out.print(Text(f"  of {found.tried} cases tried: {', '.join(parts)}"))
 
