@@ -219,6 +219,12 @@ def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
         except ValueError as error:
             raise refused(column, "a number") from error
 
+    def error(column: str) -> float:
+        value = number(column)
+        if value < 0:
+            raise refused(column, "a number, 0 or more")
+        return value
+
     def count(column: str) -> int:
         value = number(column)
         if not (value >= 0 and value.is_integer() and value < LARGEST_COUNT):
@@ -238,9 +244,9 @@ def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
         candidate=record["candidate"],
         reference=record["reference"],
         joint=record["joint"],
-        peak_error=number("peak_error"),
-        rms_error=number("rms_error"),
-        pointwise_error=number("pointwise_error"),
+        peak_error=error("peak_error"),
+        rms_error=error("rms_error"),
+        pointwise_error=error("pointwise_error"),
         worst_time_s=number("worst_time_s"),
         bound=bound(),
         verdict=record["verdict"],
