@@ -83,7 +83,8 @@ def test_what_code_of_others_does_comes_out_as_one_error(monkeypatch: pytest.Mon
         raise error
 
     for error, expected in (
-        (LoudError(), "LoudError: xxx"), (MuteError(), "MuteError: a message that cannot be shown"), (SystemExit(0), "SystemExit: 0"),
+        (LoudError(), "LoudError: xxx"), (MuteError(), "MuteError: a message that cannot be shown"),
+        (SystemExit(0), "SystemExit: 0"),
         (GeneratorExit(), "GeneratorExit"), (RecursionError("deep"), "RecursionError: deep"),
     ):  # fmt: skip
         with pytest.raises(UnrulyError, match=expected) as caught:
