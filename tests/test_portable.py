@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from floors import floors
 from small_campaign import CANDIDATES, CASE, HEAD
 from sweep_campaign import SWEEP
 
@@ -79,3 +80,13 @@ def test_no_file_uses_such_a_call_without_asking(repository: Path) -> None:
     assert unguarded("import os\nos.pread(1, 2, 3)") == ["pread"]
     assert unguarded("import os\nif hasattr(os, 'nice'): os.nice(10)") == []
     assert os.name in ("posix", "nt")
+
+
+def test_every_dependency_has_both_bounds(repository: Path) -> None:
+    text = (repository / "pyproject.toml").read_text(encoding="utf-8")
+    found = floors(text)
+    assert {"numpy", "pyarrow", "typer", "mujoco-core", "pin", "dask"} <= set(found)
+    for name in found:
+        assert f"{name}>=" in text or f"{name}[" in text
+    dependencies = [line for line in text.splitlines() if line.strip().startswith('"') and ">=" in line]
+    assert all("," in line.split('"')[1] for line in dependencies), dependencies

@@ -35,7 +35,7 @@ def workspace(
     from workbench.campaign.cases import layered, resolve_cases
     from workbench.campaign.lock import locked
     from workbench.campaign.spec import load_campaign
-    from workbench.console import print_workspace
+    from workbench.console import Steps, print_workspace
     from workbench.report.workspace import draw_workspace
     from workbench.robots.assignments import resolve_changes
     from workbench.robots.load import load_mechanism
@@ -54,8 +54,11 @@ def workspace(
     if campaign:
         spec, file = load_campaign(campaign)
         paths = {case.name: case.x for case in resolve_cases(spec, file, model)}
-    computed = compute_workspace(mechanism, grid, ranges(limit or []))
-    with locked(directory), staged(directory, alone=True) as stage:
-        write_workspace(stage, computed, mechanism)
-        draw_workspace(stage, paths)
+    with Steps("computing and drawing the workspace") as show:
+        show(0, 2)
+        computed = compute_workspace(mechanism, grid, ranges(limit or []))
+        show(1, 2)
+        with locked(directory), staged(directory, alone=True) as stage:
+            write_workspace(stage, computed, mechanism)
+            draw_workspace(stage, paths)
     print_workspace(workspace_facts(computed, mechanism), directory)
