@@ -35,6 +35,9 @@ from workbench.schema import NAME, NAME_RULE
 LIMIT_S = 60.0
 """Longest time that one call may take before it is stopped, where the system can (not in threads, not on Windows)."""
 
+LOADING_LIMIT_S = 60.0
+"""Longest time that a file may take to run, likewise."""
+
 SLOW_S = 1e-3
 """Seconds per sample from which a candidate is called slow: the papers' slowest formula takes 7e-4 s."""
 
@@ -210,7 +213,7 @@ def load_candidates(names: Iterable[str | Path]) -> tuple[UserCandidate, ...]:
     """
     found: list[UserCandidate] = []
     for name in names:
-        module, siblings = load_module(str(name), LIMIT_S)
+        module, siblings = load_module(str(name), LOADING_LIMIT_S)
         registered = [
             UserCandidate(value, mark, str(name), siblings)
             for value, mark in ((value, _mark(value)) for value in list(vars(module).values()))
@@ -249,9 +252,8 @@ def _check_registration(one: UserCandidate) -> None:
     if bound is not None and (
         isinstance(bound, bool) or not isinstance(bound, int | float) or not 0 < bound <= LARGEST_BOUND
     ):
-        shown = said(type(bound).__name__) if not isinstance(bound, float) else f"{bound:g}"
         raise SpecError(
-            f"{one.where}: bound = {shown}; allowed: a number > 0, at most {LARGEST_BOUND:g}", candidate=one.name
+            f"{one.where}: bound = {said(bound)}; allowed: a number > 0, at most {LARGEST_BOUND:g}", candidate=one.name
         )
 
 
