@@ -14,7 +14,7 @@ from pydantic import Field
 
 from workbench.errors import OutputError
 from workbench.reading import read_bytes
-from workbench.records import Record, read_record, short
+from workbench.records import Record, read_record, reason
 from workbench.report.load import Run
 
 FOLDER, RECORD, STILL, FILM = "pictures", "pictures.json", "mechanism.webp", "film.webp"
@@ -107,7 +107,9 @@ def _webp(path: Path) -> bytes:
     try:
         content = read_bytes(path, LARGEST)
     except OSError as error:
-        raise OutputError(f"{path}: cannot be read ({short(error)})") from error
+        raise OutputError(
+            f"{path}: cannot be read ({reason(error)}); allowed: a WebP picture of at most {LARGEST} bytes"
+        ) from error
     if content[:4] != b"RIFF" or content[8:12] != b"WEBP" or len(content) > LARGEST:
         raise OutputError(f"{path}: {len(content)} bytes; allowed: a WebP picture of at most {LARGEST} bytes")
     return content
