@@ -26,7 +26,7 @@ from samples import Samples, model, scattered, smooth
 from timing import Rounds, in_turn
 
 import workbench as wb
-from workbench.robots.base import Mechanism
+from workbench.capabilities.robot import Robot
 
 FORMAT = 1
 RESULTS = Path(__file__).with_name("results")
@@ -143,13 +143,13 @@ def closed_forms(bench: Bench, robot: str, compiled: floor.Floor | None) -> None
         _ratios(bench, robot, batch, found)
 
 
-def _small(mechanism: Mechanism, samples: Samples) -> None:
+def _small(mechanism: Robot, samples: Samples) -> None:
     """Do the same work in small batches, in the same round: the ratio holds on a busy machine too."""
     for _ in range(len(samples.q) // 5000):  # always the same rows, which stay in the cache
         mechanism.inverse_dynamics(samples.q[:5000], samples.qd[:5000], samples.qdd[:5000])
 
 
-def _papers_forms(bench: Bench, mechanism: Mechanism, robot: str, arrays: tuple[np.ndarray, ...]) -> None:
+def _papers_forms(bench: Bench, mechanism: Robot, robot: str, arrays: tuple[np.ndarray, ...]) -> None:
     """Apart from the fast ones, which would find their data driven out of the cache."""
     batch = len(arrays[0])
     forms = {
@@ -165,7 +165,7 @@ def _papers_forms(bench: Bench, mechanism: Mechanism, robot: str, arrays: tuple[
 
 
 def _one_sample(
-    mechanism: Mechanism, compiled: floor.Floor | None, robot: str, sample: tuple[np.ndarray, ...]
+    mechanism: Robot, compiled: floor.Floor | None, robot: str, sample: tuple[np.ndarray, ...]
 ) -> dict[str, Callable[[], object]]:
     kernel, out, still = mechanism.kernel(), np.empty(3), np.zeros(3)
     functions: dict[str, Callable[[], object]] = {"prepared kernel": lambda: kernel(*sample, still, out)}

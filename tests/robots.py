@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 import workbench as wb
+from workbench.capabilities.robot import Robot
 from workbench.errors import MotionError
-from workbench.robots.base import Mechanism
 
 MODEL = Path(__file__).resolve().parents[1] / "models" / "asym_2rss_ppap.xml"
 NOMINAL = {"L": 0.2, "l": 0.1, "a1": 0.2, "a2": 0.3, "a5": 0.25, "m1": 0.2, "m2": 0.3, "m3": 0.45, "m4": 0.1,
@@ -50,7 +50,7 @@ def sine_sum(rng: np.random.Generator, t: np.ndarray, scale: float = 1.0) -> Mot
 
 
 def motion_inside(
-    mech: Mechanism, rng: np.random.Generator, t: np.ndarray, tries: int = 20, away: float = 0.0
+    mech: Robot, rng: np.random.Generator, t: np.ndarray, tries: int = 20, away: float = 0.0
 ) -> tuple[Motion | None, int]:
     """A random motion that the closed-form kinematics accept, and how many were refused before it.
 
@@ -68,7 +68,7 @@ def motion_inside(
     return None, tries
 
 
-def table_1() -> Mechanism:
+def table_1() -> Robot:
     """The robot of the bundled model."""
     return wb.load_mechanism(MODEL)
 

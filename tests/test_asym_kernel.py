@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 import workbench as wb
 from robots import MODEL, Motion, motion_inside, peak_error, random_changes, sine_sum, table_1
+from workbench.capabilities.robot import Robot
 from workbench.errors import ArrayError, MotionError, ParameterError
-from workbench.robots.base import Mechanism
 
 EXACT = 1e-12  # rounding, relative to the quantity's peak
 DIFFERENCES = 1e-8  # what eighth-order differences with STEP leave, with a margin
@@ -30,13 +30,13 @@ SPOILED = 1e-4  # a twin must be off by more than this: ten thousand times the l
 ROBOTS = ("table 1", "random 1", "random 4", "random 3")
 
 
-def robot(label: str) -> Mechanism:
+def robot(label: str) -> Robot:
     if label == "table 1":
         return table_1()
     return wb.load_mechanism(MODEL, **random_changes(np.random.default_rng(int(label.split()[1]))))
 
 
-def states(mech: Mechanism, label: str, count: int = 24) -> tuple[Motion, np.ndarray]:
+def states(mech: Robot, label: str, count: int = 24) -> tuple[Motion, np.ndarray]:
     """A random motion inside the workspace, where differences are good, sampled coarsely; and a force."""
     rng = np.random.default_rng(ROBOTS.index(label) + 100)
     motion, _ = motion_inside(mech, rng, np.linspace(0.0, 1.0, count), tries=200, away=0.3)
@@ -311,7 +311,7 @@ def test_power_of_the_actuators_is_the_rate_of_energy(label: str) -> None:
     assert imbalance(mech.inverse_dynamics(q, qd, qdd, "distributed")) > SPOILED
 
 
-def _inside(mech: Mechanism, q: np.ndarray) -> bool:
+def _inside(mech: Robot, q: np.ndarray) -> bool:
     try:
         mech.forward_kinematics(q)
     except MotionError:

@@ -14,10 +14,10 @@ import planar_4rprp_cases as planar
 import workbench as wb
 from robots import MODEL, Motion, motion_inside, peak_error, random_changes, slope, write_model
 from workbench.campaign.run import run_campaign
+from workbench.capabilities.robot import Robot
 from workbench.dry_friction import REST_SPEED, direction
 from workbench.errors import ModelError, ParameterError
 from workbench.reference.power import power_balance
-from workbench.robots.base import Mechanism
 from workbench.robots.edit import edit_file
 
 ROUND_OFF = 1e-10
@@ -45,7 +45,7 @@ def coefficients(robot: str, seed: int) -> dict[str, float]:
     return {name: float(rng.uniform(0.1, 1.0)) * (10.0 if name in slides else 1.0) for name in names}
 
 
-def some_motion(robot: str, mech: Mechanism, seed: int) -> Motion:
+def some_motion(robot: str, mech: Robot, seed: int) -> Motion:
     if robot == "planar_4rprp":
         return planar.scattered(mech, 60, seed)
     motion, _ = motion_inside(mech, np.random.default_rng(seed), np.linspace(0.0, 2.0, 60), tries=300, away=0.05)
@@ -139,7 +139,7 @@ def turning(direction_of: Function, q: np.ndarray) -> np.ndarray:
     return rates
 
 
-def rates_of_asym(mech: Mechanism, q: np.ndarray, hinges: int = 3, arm_sign: float = 1.0) -> Rates:
+def rates_of_asym(mech: Robot, q: np.ndarray, hinges: int = 3, arm_sign: float = 1.0) -> Rates:
     p = mech.parameters
     found: Rates = []
 
@@ -166,7 +166,7 @@ def rates_of_asym(mech: Mechanism, q: np.ndarray, hinges: int = 3, arm_sign: flo
     return found
 
 
-def rates_of_planar(mech: Mechanism, q: np.ndarray, hinges: int = 1, arm_sign: float = 1.0) -> Rates:
+def rates_of_planar(mech: Robot, q: np.ndarray, hinges: int = 1, arm_sign: float = 1.0) -> Rates:
     p = mech.parameters
     feet = {1: (0.0, 0.0, 2), 2: (0.0, p.h, 0), 3: (p.b, 0.0, 2), 4: (p.a, p.h, 0)}
     found: Rates = []
@@ -185,7 +185,7 @@ def rates_of_planar(mech: Mechanism, q: np.ndarray, hinges: int = 1, arm_sign: f
     return [*found, ("damping_slide", moved[:, 0:1]), ("damping_slide", moved[:, 2:3] * arm_sign)]
 
 
-def rayleigh(rates: Rates, mech: Mechanism, qd: np.ndarray) -> np.ndarray:
+def rayleigh(rates: Rates, mech: Robot, qd: np.ndarray) -> np.ndarray:
     """Derivative of half the sum of c w^2 by qd: ``(n, 3)``."""
     return np.sum(
         [

@@ -14,8 +14,8 @@ import workbench as wb
 from robots import MODEL, Motion, motion_inside, peak_error, random_changes, table_1
 from workbench.campaign.evidence import Effort
 from workbench.campaign.run import Outcome, run_campaign
+from workbench.capabilities.robot import Robot
 from workbench.errors import ParameterError
-from workbench.robots.base import Mechanism
 from workbench.robots.mass_models import (
     MASS_MODELS,
     Bar,
@@ -48,12 +48,12 @@ SIMULATION_1 = sines((2, 5, 5), 0.1, 5.0, 1961)
 SIMULATION_2 = sines((10, 25, 35), 0.1, 1.0, 901)
 
 
-def torques(mech: Mechanism, motion: Motion, model: str, force: np.ndarray | None = None) -> np.ndarray:
+def torques(mech: Robot, motion: Motion, model: str, force: np.ndarray | None = None) -> np.ndarray:
     given_force = np.zeros_like(motion[0]) if force is None else force
     return mech.candidates[model].function(mech, *motion, given_force)
 
 
-def errors(mech: Mechanism, motion: Motion, model: str) -> np.ndarray:
+def errors(mech: Robot, motion: Motion, model: str) -> np.ndarray:
     """Peak-normalised error of each joint against distributed masses."""
     reference = mech.inverse_dynamics(*motion)
     return np.abs(torques(mech, motion, model) - reference).max(axis=0) / np.abs(reference).max(axis=0)
@@ -241,7 +241,7 @@ def test_without_weight_the_error_does_not_depend_on_the_frequency() -> None:
     """All inertia forces grow with the square of the frequency; only weights single out a speed."""
     floating = table_1().with_parameters(g=0.0)
 
-    def at(mech: Mechanism, rate: float, model: str) -> np.ndarray:
+    def at(mech: Robot, rate: float, model: str) -> np.ndarray:
         return errors(mech, sines((rate,) * 3, 0.0, 2 * np.pi / rate, 201, ahead=1.0), model)
 
     for model in ("lumped", "codourey", "end-masses-0.50"):

@@ -22,7 +22,6 @@ from workbench.mjcf.text import find, scan, tokens
 from workbench.robots.assignments import parse_assignment, resolve_changes
 from workbench.robots.edit import edit_file, resolve_for
 from workbench.robots.load import LoadedModel, load_model
-from workbench.robots.parameters import stored_names
 from workbench.robots.show import show_parameters
 from workbench.robots.values import precise, quotient
 
@@ -42,9 +41,9 @@ def bundled(path: Path) -> LoadedModel:
 def random_values(draw: st.DrawFn, path: Path) -> dict[str, float]:
     """New values with all their digits for some parameters, all of them possible robots."""
     loaded = bundled(path)
-    assert loaded.kind is not None
+    assert loaded.description is not None
     assert loaded.values is not None
-    infos = stored_names(loaded.kind.parameter_table)
+    infos = loaded.description.table.infos
     chosen = draw(st.lists(st.sampled_from(sorted(infos)), min_size=1, max_size=8, unique=True))
     values = {}
     for name in chosen:
@@ -124,9 +123,9 @@ def test_the_comparison_of_edited_files_can_fail(model: Path, tmp_path: Path) ->
 def test_fractions_need_more_digits_than_a_double_and_get_them() -> None:
     """The stored number is the product k a; for about half of all k, another k has the same product."""
     loaded = bundled(ASYM)
-    assert loaded.kind is not None
+    assert loaded.description is not None
     assert loaded.values is not None
-    target = next(t for t in loaded.kind.targets if t.reads == "k2_left")
+    target = next(t for t in loaded.description.targets if t.reads == "k2_left")
     random = np.random.default_rng(2)
     ambiguous = 0
     for k, a in random.uniform(0.05, 0.95, (400, 2)):
@@ -212,9 +211,9 @@ def test_spelling_of_tags_does_not_matter(tmp_path: Path) -> None:
 )
 def test_changes_as_users_write_them(changes: list[str], expected: dict[str, float]) -> None:
     loaded = bundled(ASYM)
-    assert loaded.kind is not None
+    assert loaded.description is not None
     assert loaded.values is not None
-    assert resolve_changes(loaded.kind, loaded.values, changes) == expected
+    assert resolve_changes(loaded.description.table, loaded.values, changes) == expected
     assert resolve_for(ASYM, changes) == expected
     for name, value in resolve_for(ASYM, changes).items():
         assert math.copysign(1, value) == math.copysign(1, expected[name])
@@ -330,9 +329,9 @@ def test_no_change_changes_nothing(tmp_path: Path) -> None:
 def test_show_lists_every_parameter_where_it_stands(model: Path) -> None:
     rows = show_parameters(model)
     loaded = bundled(model)
-    assert loaded.kind is not None
+    assert loaded.description is not None
     assert loaded.values is not None
-    assert [row.name for row in rows] == list(stored_names(loaded.kind.parameter_table))
+    assert [row.name for row in rows] == list(loaded.description.table.infos)
     lines = loaded.text.split("\n")
     elements = scan(loaded.text, "m")
     for row in rows:

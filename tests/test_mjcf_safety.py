@@ -146,7 +146,7 @@ def test_words_that_look_like_numbers_are_names(tmp_path: Path) -> None:
     path = tmp_path / "model.xml"
     text = TEXT.replace('"rail"', '"nan"').replace("<custom>", '<custom><text name="note" data="inf"/>')
     path.write_text(text.replace('class="visual"', 'class="inf"'))
-    assert load_model(path).mechanism is not None
+    assert load_model(path).closed_form is not None
 
 
 def test_limits_leave_room(tmp_path: Path) -> None:
@@ -157,7 +157,7 @@ def test_limits_leave_room(tmp_path: Path) -> None:
     texture = '<texture name="t" type="2d" builtin="checker" width="1024" height="1024"/>'
     text = inside("worldbody", many + deep).replace("<asset>", "<asset>" + texture)
     path.write_text(text.replace("<option", '<size memory="100M"/><option', 1))
-    assert load_model(path).mechanism is not None
+    assert load_model(path).closed_form is not None
 
 
 def make_directory(path: Path) -> None:

@@ -17,12 +17,12 @@ import pytest
 
 from small_campaign import HEAD, Workbench
 from workbench.arrays import FloatArray
+from workbench.capabilities.robot import Robot
 from workbench.robots.asym_2rss_ppap import literal
 from workbench.robots.asym_2rss_ppap.closed_form import Asym2rssPpap
 from workbench.robots.asym_2rss_ppap.literal import Misprint
-from workbench.robots.base import Mechanism
 
-Torques = Callable[[Mechanism, FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
+Torques = Callable[[Robot, FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 
 # "skew" has q2 != q3; in "mirrored" they are equal at all times, as in the paper's first simulation
 CAMPAIGN = f"""{HEAD}
@@ -53,9 +53,7 @@ samples = 21
 
 
 def misprinted(function: Callable[..., FloatArray], misprint: Misprint) -> Torques:
-    def torques(
-        mech: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray
-    ) -> FloatArray:
+    def torques(mech: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray) -> FloatArray:
         motion = mech.platform_motion(q, qd, qdd)
         return function(mech.parameters, q, qd, qdd, *motion, external_force, frozenset({misprint}))
 
@@ -65,9 +63,7 @@ def misprinted(function: Callable[..., FloatArray], misprint: Misprint) -> Torqu
 def swapped_joints(sound: Torques) -> Torques:
     order = [0, 2, 1]
 
-    def torques(
-        mech: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray
-    ) -> FloatArray:
+    def torques(mech: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray) -> FloatArray:
         return sound(mech, q, qd, qdd, external_force)[:, order]
 
     return torques
@@ -76,9 +72,7 @@ def swapped_joints(sound: Torques) -> Torques:
 def moved_mass_centre(sound: Torques) -> Torques:
     """Rod CE's mass centre by 1 % of its length: 3 mm."""
 
-    def torques(
-        mech: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray
-    ) -> FloatArray:
+    def torques(mech: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray) -> FloatArray:
         return sound(mech.with_parameters(k2_left=0.51), q, qd, qdd, external_force)
 
     return torques

@@ -12,7 +12,7 @@ import pytest
 
 import workbench as wb
 from robots import MODEL, Motion, motion_inside, peak_error, random_changes
-from workbench.robots.base import Mechanism
+from workbench.capabilities.robot import Robot
 
 BOUND = 1e-10  # peak-normalised, per joint: rounding with a wide margin, below any modelling error
 TIME = np.linspace(0.0, 1.0, 60)
@@ -21,7 +21,7 @@ MASS_MODELS = ("distributed", "lumped")
 
 
 @cache
-def robot(seed: int) -> tuple[dict[str, float], Mechanism, Motion, np.ndarray, int]:
+def robot(seed: int) -> tuple[dict[str, float], Robot, Motion, np.ndarray, int]:
     """Parameters, closed form, motion, force, and how many robots and motions had no place in the workspace."""
     rng = np.random.default_rng(seed)
     refused = 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import workbench as wb
-from workbench.robots.base import Mechanism
+from workbench.capabilities.robot import Robot
 
 MODEL = "models/asym_2rss_ppap.xml"
 FORCE = np.array([7.0, -4.0, 11.0])
@@ -20,7 +20,7 @@ def motion() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return q, amplitude * rate * np.cos(turn), -amplitude * rate**2 * np.sin(turn)
 
 
-def arm_tip(mechanism: Mechanism, side: str, angle: np.ndarray, rate: np.ndarray, acceleration: np.ndarray) -> tuple:
+def arm_tip(mechanism: Robot, side: str, angle: np.ndarray, rate: np.ndarray, acceleration: np.ndarray) -> tuple:
     """Position and acceleration of C or D, paper frame, from the arm's angle."""
     p, outward = mechanism.parameters, -1.0 if side == "left" else 1.0
     a1, base = getattr(p, f"a1_{side}"), outward * getattr(p, f"L_{side}")

@@ -10,9 +10,9 @@ import pytest
 
 import workbench as wb
 from robots import MODEL, FourBar, sine_sum, table_1, write_model
+from workbench.capabilities.robot import Robot
 from workbench.errors import ModelError, MotionError
 from workbench.reference import ReferenceResult
-from workbench.robots.base import Mechanism
 
 SAME = 1e-12
 CONNECT = '<connect name="loop" site1="coupler_tip" site2="rocker_tip"/>'
@@ -58,7 +58,7 @@ def test_single_samples_far_from_home_keep_the_branch_of_the_closed_form() -> No
         assert np.abs(at_rest(reference, q[i : i + 1]).x - mech.forward_kinematics(q[i : i + 1])).max() < SAME * 100
 
 
-def _measures(mech: Mechanism, q: np.ndarray) -> float:
+def _measures(mech: Robot, q: np.ndarray) -> float:
     try:
         return float(min(np.abs(v).min() for v in mech.singularity_measures(q).values()))
     except MotionError:

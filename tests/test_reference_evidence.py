@@ -73,7 +73,7 @@ def planar(repository: Path) -> wb.MujocoReference:
 
 
 @pytest.fixture(scope="module")
-def closed_form(repository: Path) -> wb.Mechanism:
+def closed_form(repository: Path) -> wb.Robot:
     return wb.load_mechanism(repository / "models" / "asym_2rss_ppap.xml")
 
 
@@ -173,16 +173,17 @@ def test_steps_are_shortened_at_the_edge_of_the_workspace(planar: wb.MujocoRefer
     height, middle = 0.01, 0.3
     limb = np.hypot(height, middle)
     q, qd, qdd = np.array([[limb, 0.31, limb]]), np.array([[-0.003, 0.1, -0.003]]), np.zeros((1, 3))
+    qpos = planar.inverse_dynamics(q, qd, qdd).qpos
     scale = power.time_scale(qd, qdd)
     with pytest.raises(MotionError):
-        power._difference(planar, q, qd, qdd, "distributed", power.FIRST_STEP * scale)
+        power._difference(planar, qpos, q, qd, qdd, "distributed", power.FIRST_STEP * scale)
     assert power_balance(planar, q, qd, qdd).relative < 1e-6
 
 
 # forward replay
 
 
-def torques_of(mechanism: wb.Mechanism, **factors: float) -> dict[str, replay.TorqueAt]:
+def torques_of(mechanism: wb.Robot, **factors: float) -> dict[str, replay.TorqueAt]:
     named: dict[str, replay.TorqueAt] = {
         name: lambda q, qd, qdd, name=name: mechanism.inverse_dynamics(q, qd, qdd, name)
         for name in ("distributed", "lumped")
@@ -192,7 +193,7 @@ def torques_of(mechanism: wb.Mechanism, **factors: float) -> dict[str, replay.To
     return named
 
 
-def test_replay_of_simulation_2(asym: wb.MujocoReference, closed_form: wb.Mechanism) -> None:
+def test_replay_of_simulation_2(asym: wb.MujocoReference, closed_form: wb.Robot) -> None:
     found = replay.replay(asym, at(SIMULATION_2), torques_of(closed_form, off=1.01), 0.0, 1.0)
     assert found.limited_by == ""
     right, lumped = found.replays["distributed"], found.replays["lumped"]

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 import workbench as wb
+from workbench.capabilities.robot import Robot
 from workbench.compiled import KERNEL_FILES
 from workbench.errors import ArrayError, MotionError, ParameterError
 from workbench.robots.asym_2rss_ppap import kernel as asym_kernel
-from workbench.robots.base import Mechanism
 from workbench.robots.blocks import BLOCK
 from workbench.robots.kernel_call import SAMPLES_PER_THREAD
 from workbench.robots.planar_4rprp import kernel as planar_kernel
@@ -35,11 +35,11 @@ SAMPLES = BLOCK + 37
 both_robots = pytest.mark.parametrize("robot", sorted(PLACES))
 
 
-def mechanism_of(robot: str, **parameters: float) -> Mechanism:
+def mechanism_of(robot: str, **parameters: float) -> Robot:
     return wb.load_mechanism(REPOSITORY / "models" / f"{robot}.xml", **parameters)
 
 
-def state(mechanism: Mechanism, samples: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def state(mechanism: Robot, samples: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     random = np.random.default_rng(seed)
     x = np.array(PLACES[mechanism.name]) + random.uniform(-0.03, 0.03, (samples, 3))
     return mechanism.inverse_kinematics(x), random.normal(size=(samples, 3)), 10 * random.normal(size=(samples, 3))

@@ -8,20 +8,20 @@ import pandas as pd
 import pytest
 
 import workbench as wb
+from workbench.capabilities.robot import Robot
 from workbench.cli import _run
 from workbench.errors import MotionError, ParameterError
-from workbench.robots.base import Mechanism
 from workbench.workspace.grid import Workspace, compute_workspace
 
 MODELS = ("models/asym_2rss_ppap.xml", "models/planar_4rprp.xml")
 
 
 @pytest.fixture(params=MODELS, ids=["2RSS+PPaP", "4-RPRP"])
-def mechanism(request: pytest.FixtureRequest) -> Mechanism:
+def mechanism(request: pytest.FixtureRequest) -> Robot:
     return wb.load_mechanism(request.param)
 
 
-def poses(mechanism: Mechanism, count: int) -> np.ndarray:
+def poses(mechanism: Robot, count: int) -> np.ndarray:
     """Platform positions of random poses within the joint limits, by forward kinematics."""
     rng = np.random.default_rng(5)
     low, high = np.array(mechanism.joint_limits).T
@@ -43,7 +43,7 @@ def share_inside(workspace: Workspace, points: np.ndarray, border: int) -> float
     return float(np.mean([any(grid[tuple(i + s)] for s in shifts) for i in index]))
 
 
-def test_every_pose_lies_in_it(mechanism: Mechanism) -> None:
+def test_every_pose_lies_in_it(mechanism: Robot) -> None:
     points = poses(mechanism, 400)
     if mechanism.name == "asym_2rss_ppap":
         # arms that point inward reach the same positions with the other elbow; only elbows out are counted
@@ -59,7 +59,7 @@ def test_every_pose_lies_in_it(mechanism: Mechanism) -> None:
     assert share_inside(small, points, border=0) < 0.9
 
 
-def test_cells_in_reach_are_reached(mechanism: Mechanism) -> None:
+def test_cells_in_reach_are_reached(mechanism: Robot) -> None:
     workspace = compute_workspace(mechanism, 0.03)
     np.testing.assert_allclose(mechanism.forward_kinematics(workspace.q), workspace.x, atol=1e-9)
     limits = np.array(workspace.limits)
@@ -67,9 +67,7 @@ def test_cells_in_reach_are_reached(mechanism: Mechanism) -> None:
 
 
 @pytest.mark.parametrize("spacing", [0.04, 0.02, 0.013])
-def test_halving_the_grid_changes_the_volume_by_less_than_the_error_it_states(
-    mechanism: Mechanism, spacing: float
-) -> None:
+def test_halving_the_grid_changes_the_volume_by_less_than_the_error_it_states(mechanism: Robot, spacing: float) -> None:
     coarse, fine = compute_workspace(mechanism, spacing), compute_workspace(mechanism, spacing / 2)
     assert abs(coarse.volume - fine.volume) < coarse.volume_error
     assert 0.4 * coarse.volume_error < fine.volume_error < 0.6 * coarse.volume_error

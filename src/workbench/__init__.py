@@ -15,19 +15,32 @@ from typing import TYPE_CHECKING, Any
 from workbench._version import __version__
 
 if TYPE_CHECKING:
+    from workbench.capabilities.load import load_robot
+    from workbench.capabilities.load import load_robot as load_mechanism
+    from workbench.capabilities.robot import Robot
     from workbench.errors import WorkbenchError
     from workbench.reference import MujocoReference
     from workbench.report.frames import load_run
-    from workbench.robots.load import load_mechanism
     from workbench.robots.registration import candidate
 
-__all__ = ["MujocoReference", "WorkbenchError", "__version__", "candidate", "load_mechanism", "load_run"]
+__all__ = [
+    "MujocoReference",
+    "Robot",
+    "WorkbenchError",
+    "__version__",
+    "candidate",
+    "load_mechanism",
+    "load_robot",
+    "load_run",
+]
 
 _HOMES = {
     "MujocoReference": "workbench.reference",
     "WorkbenchError": "workbench.errors",
     "candidate": "workbench.robots.registration",
-    "load_mechanism": "workbench.robots.load",
+    "load_mechanism": "workbench.capabilities.load:load_robot",
+    "load_robot": "workbench.capabilities.load",
+    "Robot": "workbench.capabilities.robot",
     "load_run": "workbench.report.frames",
 }
 
@@ -35,7 +48,8 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first asked for."""
     if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
+        module, _, called = _HOMES[name].partition(":")
+        return getattr(import_module(module), called or name)
     raise AttributeError(f"module 'workbench' has no attribute {name!r}")
 
 

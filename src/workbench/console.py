@@ -237,10 +237,14 @@ def _quantity(value: float, unit: str) -> str:
 
 def print_workspace(facts: dict[str, Any], directory: Path) -> None:
     """Print volume, its error, extent and joint limits of a workspace, and where it lies."""
+    what, unit = {3: ("volume", "m^3"), 2: ("area", "m^2"), 1: ("length", "m")}[len(facts["shape"])]
+    key = f"{what}_{unit.replace('^', '')}"
+    amount, error = facts[key], facts[key.replace(what, f"{what}_error")]
+    held = "".join(f", {name} held at {value:.4g}" for name, value in facts["held"].items())
     out.print(
         Text(
-            f"Volume {facts['volume_m3']:.5f} m^3 +- {facts['volume_error_m3']:.5f} m^3 (half of the cells at the"
-            f" border), {facts['cells']} cells of {1000 * facts['spacing_m']:g} mm"
+            f"{what.capitalize()} {amount:.5f} {unit} +- {error:.5f} {unit} (half of the cells at the"
+            f" border), {facts['cells']} cells of {1000 * facts['spacing_m']:g} mm{held}"
         )
     )
     for axis, (low, high) in facts["extent_m"].items():

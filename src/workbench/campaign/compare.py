@@ -13,11 +13,13 @@ from workbench.arrays import FloatArray
 from workbench.campaign.candidate_spec import CandidateSpec
 from workbench.campaign.cases import Case, at_time
 from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
+from workbench.campaign.platform import Platform, platform_of
 from workbench.campaign.spec import Campaign
 from workbench.campaign.torques import Fault, torques_of
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdict_of
 from workbench.errors import ModelError, MotionError
+from workbench.hints import hint_of
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.raw_inverse import raw_mj_inverse
 from workbench.reference.skeleton import skeleton
@@ -37,7 +39,7 @@ KINEMATICS_BOUND = 1e-11
 rounding, with two digits to spare near singular poses."""
 
 OTHER_BRANCH = 1e-6
-"""Metres; a platform farther than this from the closed form's is another pose of the mechanism, not rounding."""
+"""Metres; a platform farther than this from the closed form's is another pose of the robot, not rounding."""
 
 
 @dataclass(frozen=True)
@@ -92,18 +94,23 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     ModelError
         The model's platform is somewhere else than the closed form's.
     """
-    motion, mechanism = case.motion, case.mechanism
-    reference = MujocoReference(case.model, threads=1, loaded=case.loaded, setup=case.setup, **case.overrides)
+    motion, robot = case.motion, case.robot
+    reference = case.robot.reference
     results: dict[str, ReferenceResult] = {}
     series = _motion_columns(case)
     try:
         for mass_model in dict.fromkeys(c.reference for c in campaign.candidate) or ("distributed",):
-            results[mass_model] = reference.inverse_dynamics(motion.q, motion.qd, motion.qdd, mass_model, case.force)
+            results[mass_model] = reference.inverse_dynamics(
+                motion.q, motion.qd, motion.qdd, mass_model, case.force, along=motion.t
+            )
         computed = torques_of(case, dict.fromkeys(c.name for c in campaign.candidate))
         torques = computed.torques
     except MotionError as error:
         raise at_time(error, motion.t) from error
-    _refuse_other_branch(case, next(iter(results.values())).x)
+    platform = platform_of(case, next(iter(results.values())))
+    series |= platform.columns()
+    if robot.closed_kinematics:  # else the case's platform motion is the reference's own
+        _refuse_other_branch(case, platform.task[0])
     sound = [name for name in torques if name not in computed.faults]
     evidence = gather_evidence(case, reference, results, sound, effort)
     rows = [
@@ -112,18 +119,20 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for row in _rows(case, candidate, computed.judged(candidate.name), results[candidate.reference], evidence)
     ]
     rows = [dataclasses.replace(row, verdict=FAIL) if row.candidate in computed.faults else row for row in rows]
+    hints = _hints(case, rows, torques, results)
     if effort.budget:
         rows += _raw_rows(case, reference, results, evidence)
     for mass_model, result in results.items():
-        series |= _columns(f"ref_{mass_model}", result.tau, mechanism.joints)
+        series |= _columns(f"ref_{mass_model}", result.tau, robot.joints)
     for name in sound:
         tau = torques[name]
-        series |= _columns(f"cand_{name}", tau, mechanism.joints)
+        series |= _columns(f"cand_{name}", tau, robot.joints)
     first = next(iter(results.values()))
     for joint, force in first.reactions.items():
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual
-    facts = _facts(case, reference, first, rows) | {"evidence": evidence.facts()}
+    facts = _facts(case, reference, first, rows, platform) | {"evidence": evidence.facts()}
+    facts["warnings"] += hints
     if effort.drawing:
         drawing = skeleton(reference, first.qpos)
         for point, place in drawing.points.items():
@@ -134,8 +143,20 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     return CaseResult(case.name, rows, series, computed.noted(facts), faults, reference.text, poses)
 
 
+def _hints(
+    case: Case, rows: Sequence[Row], torques: Mapping[str, FloatArray], results: Mapping[str, ReferenceResult]
+) -> list[str]:
+    """What the errors of candidates that fail look like, where they have a familiar shape."""
+    failed = dict.fromkeys((row.candidate, row.reference) for row in rows if row.verdict in FAILURES)
+    said = []
+    for name, reference in failed:
+        words = hint_of(torques[name], results[reference].tau, case.motion.t, case.robot.joints)
+        said += [f'candidate "{name}" against "{reference}": {words}'] if words else []
+    return said
+
+
 def _refuse_other_branch(case: Case, x: FloatArray) -> None:
-    """Refuse a model whose platform ``(n, 3)`` is elsewhere: torques on another assembly branch compare nothing."""
+    """Refuse a model whose platform ``(n, m)`` is elsewhere: torques on another assembly branch compare nothing."""
     gaps = np.linalg.norm(case.x - x, axis=1)
     worst = int(gaps.argmax())
     if gaps[worst] > OTHER_BRANCH:
@@ -155,7 +176,7 @@ def _raw_rows(
     motion = case.motion
     name = "distributed" if "distributed" in results else next(iter(results))
     spec = CandidateSpec(name=RAW_NAME, reference=name)
-    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force)
+    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force, motion.t)
     rows = _rows(case, spec, tau, results[name], evidence)
     return [dataclasses.replace(row, candidate=RAW_INVERSE, kind=CONTRAST) for row in rows]
 
@@ -165,7 +186,7 @@ def _rows(
 ) -> list[Row]:
     rows = []
     reaction = largest_reaction(reference.reactions.values())
-    for i, joint in enumerate(case.mechanism.joints):
+    for i, joint in enumerate(case.robot.joints):
         error = joint_error(tau[:, i], reference.tau[:, i], reaction)
         uncertainty = evidence.uncertainty(candidate.reference, joint)
         judged = candidate.in_case(case.spec, joint)
@@ -182,7 +203,7 @@ def _rows(
                 bound=judged.bound,
                 verdict=verdict_of(judged, case.name, joint, error.peak_error, uncertainty),
                 kind=kind_of(candidate),
-                unit=case.mechanism.force_units[i],
+                unit=case.robot.force_units[i],
                 peak_reference=error.peak_reference,
                 pointwise_skipped=error.pointwise_skipped,
                 normaliser=normaliser_of(error, reaction),
@@ -203,23 +224,23 @@ def _motion_columns(case: Case) -> dict[str, FloatArray]:
     columns: dict[str, FloatArray] = {"t": motion.t}
     for prefix, values in (("q", motion.q), ("qd", motion.qd), ("qdd", motion.qdd)):
         columns |= {f"{prefix}{i + 1}": values[:, i] for i in range(values.shape[1])}
-    for prefix, values in (("x", case.x), ("xd", case.xd), ("xdd", case.xdd)):
-        columns |= {f"{prefix}{i + 1}": values[:, i] for i in range(3)}
     return columns
 
 
-def _facts(case: Case, reference: MujocoReference, result: ReferenceResult, rows: list[Row]) -> dict[str, Any]:
+def _facts(
+    case: Case, reference: MujocoReference, result: ReferenceResult, rows: list[Row], platform: Platform
+) -> dict[str, Any]:
     t = case.motion.t
     mobility = reference.mobility()
     speed = np.linalg.norm(result.xd, axis=1)
     acceleration = np.linalg.norm(result.xdd, axis=1)
-    measures = case.mechanism.singularity_measures(case.motion.q)
+    measures = case.robot.singularity_measures(case.motion.q)
     kinematics = {}
-    if case.mechanism.closed_kinematics:  # else case.x is the reference's own
+    if case.robot.closed_kinematics:  # else case.x is the reference's own
         kinematics = {
-            "position": _apart(case.x, result.x),
-            "velocity": _apart(case.xd, result.xd),
-            "acceleration": _apart(case.xdd, result.xdd),
+            "position": platform.apart(0),
+            "velocity": platform.apart(1),
+            "acceleration": platform.apart(2),
         }
     apart = [f"{name} by {error:.2g}" for name, error in kinematics.items() if not error <= KINEMATICS_BOUND]
     message = f"platform {', '.join(apart)} of its peak (allowed: {KINEMATICS_BOUND:g})" if apart else None
@@ -252,17 +273,11 @@ def _facts(case: Case, reference: MujocoReference, result: ReferenceResult, rows
             for name, v in measures.items()
         },
         "kinematics": kinematics,
-        "conditions": [dataclasses.asdict(c) for c in case.mechanism.paper_conditions(case.motion.q)],
-        "solutions_at_start": case.mechanism.assembly_solutions(case.motion.q[:1])[0].tolist(),
+        "conditions": [dataclasses.asdict(c) for c in case.robot.conditions(case.motion.q)],
+        "solutions_at_start": case.robot.assembly_solutions(case.motion.q[:1])[0].tolist(),
         "peak_reactions": {name: float(np.linalg.norm(f, axis=1).max()) for name, f in result.reactions.items()},
-        "warnings": case.mechanism.warnings(case.motion.t, case.motion.q, case.motion.qd),
+        "warnings": [
+            *case.motion.warnings,
+            *case.robot.warnings(case.motion.t, case.motion.q, case.motion.qd),
+        ],
     }
-
-
-def _apart(candidate: FloatArray, reference: FloatArray) -> float:
-    """Largest distance over the largest magnitude; 0 where both vanish."""
-    distance = float(np.linalg.norm(candidate - reference, axis=1).max())
-    magnitude = float(np.linalg.norm(reference, axis=1).max())
-    if magnitude == 0.0:
-        return 0.0 if distance == 0.0 else float("inf")
-    return distance / magnitude

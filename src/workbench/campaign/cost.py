@@ -21,16 +21,16 @@ def cost_us(case: Case, candidate: str) -> float:
 
     The samples are the case's own, repeated to a batch of `BATCH`; a first call, which may compile, is not counted.
     """
-    mechanism, motion = case.mechanism, case.motion
+    robot, motion = case.robot, case.motion
     samples = np.resize(np.arange(len(motion.t)), BATCH)
     arguments = motion.q[samples], motion.qd[samples], motion.qdd[samples], case.force[samples]
-    function = mechanism.candidates[candidate].function
+    function = robot.candidates[candidate].function
     if isinstance(function, UserCandidate):  # measured while it ran: it may be slow, or fail
         return 1e6 * function.seconds_per_sample
-    function(mechanism, *arguments)
+    function(robot, *arguments)
     taken: list[float] = []
     while len(taken) < REPEATS and sum(taken) < BUDGET_S:
         begun = time.perf_counter()
-        function(mechanism, *arguments)
+        function(robot, *arguments)
         taken.append(time.perf_counter() - begun)
     return 1e6 * statistics.median(taken) / BATCH

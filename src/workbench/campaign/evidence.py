@@ -34,7 +34,7 @@ class Effort:
     budget: bool = True
     """power balance, forward replay and the row of raw `mj_inverse`"""
     drawing: bool = True
-    """the mechanism's points over time, for drawings of it"""
+    """the robot's points over time, for drawings of it"""
 
 
 FULL = Effort()
@@ -138,7 +138,7 @@ def gather_evidence(
     if not effort.budget:
         return Evidence(spread=spread, times=motion.t)
     power = {
-        name: power_balance(reference, motion.q, motion.qd, motion.qdd, name, force, tau=result.tau)
+        name: power_balance(reference, motion.q, motion.qd, motion.qdd, name, force, tau=result.tau, along=motion.t)
         for name, result in results.items()
     }
     return Evidence(power, spread, _replays(case, reference, candidates), motion.t)
@@ -148,27 +148,27 @@ def _spread(case: Case, results: Mapping[str, ReferenceResult]) -> dict[str, dic
     from workbench.reference.pinocchio_reference import PinocchioReference
 
     motion = case.motion
-    engine = PinocchioReference(case.model, setup=case.setup, **case.overrides)
+    engine = PinocchioReference(case.model, loaded=case.robot.loaded)
     spread: dict[str, dict[str, float]] = {}
     for name, result in results.items():
-        tau = engine.inverse_dynamics(motion.q, motion.qd, motion.qdd, name, case.force).tau
+        tau = engine.inverse_dynamics(motion.q, motion.qd, motion.qdd, name, case.force, ordered=True).tau
         reaction = largest_reaction(result.reactions.values())
         spread[name] = {
             joint: joint_error(tau[:, i], result.tau[:, i], reaction).peak_error
-            for i, joint in enumerate(case.mechanism.joints)
+            for i, joint in enumerate(case.robot.joints)
         }
     return spread
 
 
 def _replays(case: Case, reference: MujocoReference, candidates: list[str]) -> ReplaySet | None:
-    motion, mechanism, force = case.motion, case.mechanism, case.force[0]
+    motion, robot, force = case.motion, case.robot, case.force[0]
 
     def torque_of(name: str) -> Any:
-        function = mechanism.candidates[name].function
+        function = robot.candidates[name].function
 
         def torque(q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
             try:
-                return function(mechanism, q, qd, qdd, np.tile(force, (len(q), 1)))
+                return function(robot, q, qd, qdd, np.tile(force, (len(q), 1)))
             except CandidateError:  # a user's formula may hold at the samples and fail between them
                 return np.full_like(q, np.nan)
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
 from workbench.campaign import provenance
 from workbench.campaign.commit import git_commit
 from workbench.campaign.spec import Campaign
-from workbench.robots.base import Mechanism
-from workbench.robots.parameters import stored_names
+from workbench.capabilities.robot import Robot
 
 
 def shown(path: Path, campaign_file: Path) -> str:
@@ -20,9 +18,9 @@ def shown(path: Path, campaign_file: Path) -> str:
     return found.relative_to(above).as_posix() if found.is_relative_to(above) else path.name
 
 
-def describe(campaign: Campaign, file: Path, model: Path, mechanism: Mechanism) -> dict[str, Any]:
+def describe(campaign: Campaign, file: Path, model: Path, robot: Robot) -> dict[str, Any]:
     """Return the keys that stand in the manifest of every run, with or without a sweep."""
-    values = dataclasses.asdict(mechanism.parameters)
+    values = robot.values
     return {
         "campaign": campaign.name,
         "title": campaign.title,
@@ -32,18 +30,18 @@ def describe(campaign: Campaign, file: Path, model: Path, mechanism: Mechanism) 
         "model": {
             "file": shown(model, file),
             "sha256": provenance.sha256(model.read_bytes()),
-            "mechanism": mechanism.name,
-            "title": mechanism.title,
-            "reference_key": mechanism.reference_key,
+            "mechanism": robot.name,
+            "title": robot.title,
+            "reference_key": robot.reference_key,
         },
-        "joints": list(mechanism.joints),
-        "coordinate_units": list(mechanism.coordinate_units),
-        "force_units": list(mechanism.force_units),
-        "platform_axes": list(mechanism.platform_axes),
-        "mobility_count": mechanism.mobility_count(),
+        "joints": list(robot.joints),
+        "coordinate_units": list(robot.coordinate_units),
+        "force_units": list(robot.force_units),
+        "platform_axes": list(robot.platform_axes),
+        "mobility_count": robot.mobility_count(),
         "parameters": [
             {"name": name, "value": values[name], "unit": info.unit, "meaning": info.meaning, "source": info.source}
-            for name, info in stored_names(mechanism.parameter_table).items()
+            for name, info in robot.description.table.infos.items()
         ],
         "versions": provenance.versions(),
         "machine": provenance.machine(),

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.campaign import provenance
-from workbench.campaign.cases import locate, resolve_cases
+from workbench.campaign.cases import locate, resolve_cases, robot_files
 from workbench.campaign.compare import Row
 from workbench.campaign.evidence import Effort
+from workbench.campaign.motion_spec import TableMotion
 from workbench.campaign.run import compute_named_case
-from workbench.campaign.spec import CsvMotion, load_campaign
+from workbench.campaign.spec import load_campaign
 from workbench.campaign.user_candidates import load_candidates, with_rows
 from workbench.errors import WorkbenchError
 from workbench.mjcf.compile import find_model
@@ -63,8 +63,8 @@ def compute_errors(
     results = [compute_named_case(campaign, case, file, QUICK) for case in cases]
     return Errors(
         rows=tuple(row for result in results for row in result.rows),
-        joints=cases[0].mechanism.joints,
-        parameters={case.name: dataclasses.asdict(case.mechanism.parameters) for case in cases},
+        joints=cases[0].robot.joints,
+        parameters={case.name: case.robot.values for case in cases},
         messages=tuple(f'case "{r.name}": {r.facts["message"]}' for r in results if r.facts["message"]),
         seconds=time.perf_counter() - clock,
     )
@@ -79,11 +79,12 @@ def files_of(path: str | Path, model: Path | None = None, candidates: Sequence[s
     with contextlib.suppress(WorkbenchError):
         campaign, file = load_campaign(path)
         found[0] = file
-        names = [] if model is not None else [(campaign.model, "model")]
-        names += [(case.motion.file, "motion.file") for case in campaign.case if isinstance(case.motion, CsvMotion)]
-        for name, what in names:
-            with contextlib.suppress(WorkbenchError):
-                found.append(locate(file, name, what))
+        with contextlib.suppress(WorkbenchError):
+            found += robot_files(campaign, file, model)
+        for case in campaign.case:
+            if isinstance(case.motion, TableMotion):
+                with contextlib.suppress(WorkbenchError):
+                    found.append(locate(file, case.motion.file, "motion.file"))
     return tuple(dict.fromkeys(found))
 
 

@@ -187,17 +187,17 @@ def compute_named_case(campaign: Campaign, case: Case, file: Path, effort: Effor
     try:
         return compute_case(campaign, case, effort)
     except WorkbenchError as found:
-        error = with_unit_hint(found, case.mechanism)
+        error = with_unit_hint(found, case.robot)
         raise type(error)(f'{file}: case "{case.name}": {error}', **{**error.facts, "case": case.name}) from found
 
 
 def _manifest(
     campaign: Campaign, file: Path, cases: list[Case], facts: Mapping[str, Mapping[str, Any]], rows: list[Row]
 ) -> dict[str, Any]:
-    mechanism = cases[0].mechanism
-    candidates = {c.name: mechanism.candidates[c.name] for c in campaign.candidate}
+    robot = cases[0].robot
+    candidates = {c.name: robot.candidates[c.name] for c in campaign.candidate}
     printed = {c.name: c.printed_cost for c in campaign.candidate if c.printed_cost}
-    return describe(campaign, file, cases[0].model, mechanism) | {
+    return describe(campaign, file, cases[0].model, robot) | {
         "format": store.FORMAT,
         "candidates": {
             name: {

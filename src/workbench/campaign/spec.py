@@ -13,27 +13,15 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
-from workbench.campaign.own_mechanism import OwnMechanism
+from workbench.campaign.motion_spec import MOTIONS, Motion
+from workbench.campaign.robot_spec import RobotKeys
 from workbench.campaign.sweep_spec import Filter, SweepSpec, Vary
 from workbench.data_files import bundled, bundled_names
 from workbench.documents import Form, read_toml, shorten
 from workbench.errors import SpecError, WorkbenchError, did_you_mean
-from workbench.schema import Finite, Name, Strict, Triple, Vector
+from workbench.schema import Finite, Name, Strict, Triple
 
 FORMAT = 1
-MAX_SAMPLES = 100_000
-"""Samples of one case: the reference holds some 20 kB of matrices for each while it computes."""
-
-Term = Annotated[list[Finite], Field(min_length=2, max_length=3)]
-"""Amplitude, frequency and, where it is given, phase."""
-
-MAX_TERMS = 1000
-"""Sinusoids of one joint."""
-
-Moment = Annotated[Finite, Field(ge=-1e6, le=1e6)]
-"""Seconds; beyond some weeks the phase of a sinusoid is no longer known to all digits."""
-
-Samples = Annotated[int, Field(le=MAX_SAMPLES)]
 
 
 def no_boolean(value: object) -> object:
@@ -41,72 +29,6 @@ def no_boolean(value: object) -> object:
     if isinstance(value, bool):
         raise ValueError("should be a number")
     return value
-
-
-class Window(Strict):
-    """When a motion is sampled: seconds, and either a number of samples or a rate in hertz."""
-
-    start: Moment = 0.0
-    stop: Moment
-    samples: Samples | None = None
-    rate: Finite | None = None
-
-    @model_validator(mode="after")
-    def _one_of(self) -> Window:
-        if (self.samples is None) == (self.rate is None):
-            raise ValueError("give exactly one of samples and rate")
-        if self.rate is not None and (self.stop - self.start) * self.rate >= MAX_SAMPLES:
-            raise ValueError(f"rate = {self.rate:g} Hz makes more samples than allowed: {MAX_SAMPLES}")
-        return self
-
-
-class SineMotion(Window):
-    """One sinusoid per joint."""
-
-    kind: Literal["sine"]
-    offset: Vector
-    amplitude: Vector
-    frequency: Vector
-    phase: Vector | None = None
-
-
-class MultiSineMotion(Window):
-    """Any number of sinusoids per joint, each ``[amplitude, frequency, phase]``."""
-
-    kind: Literal["multi_sine"]
-    offset: Vector
-    terms: list[
-        Annotated[list[Annotated[list[Finite], Field(min_length=2, max_length=3)]], Field(max_length=MAX_TERMS)]
-    ]
-
-
-class CycleMotion(Strict):
-    """A pick-and-place cycle planned in platform space."""
-
-    kind: Literal["pick_and_place"]
-    pick: Triple
-    place: Triple
-    lift: Finite | Triple
-    up: Triple | None = None
-    lift_time: Finite
-    traverse_time: Finite
-    lower_time: Finite | None = None
-    dwell: Finite = 0.0
-    overlap: Finite = 0.0
-    back: bool = False
-    law: str = "quintic"
-    samples: Samples | None = None
-    rate: Finite | None = None
-
-
-class CsvMotion(Strict):
-    """A motion from a file beside the campaign: ``t, q1, q2, q3`` and, if given, derivatives."""
-
-    kind: Literal["csv"]
-    file: str
-
-
-Motion = Annotated[SineMotion | MultiSineMotion | CycleMotion | CsvMotion, Field(discriminator="kind")]
 
 
 class ReplayWindow(Strict):
@@ -168,14 +90,13 @@ class ClaimSpec(Strict):
     note: str = ""
 
 
-class Campaign(OwnMechanism):
+class Campaign(RobotKeys):
     """A whole campaign file."""
 
     format: Annotated[Literal[1], BeforeValidator(no_boolean)] = 1
     name: Name
     title: str
     description: str = ""
-    model: str
     parameters: dict[str, Finite] = Field(default_factory=dict)
     candidate: list[CandidateSpec] = Field(default_factory=list)
     """may be empty where the campaign brings its own mechanism: then the reference alone is computed"""
@@ -248,14 +169,14 @@ FORM = Form(
         "candidate": CandidateSpec, "case": CaseSpec, "claim": ClaimSpec, "figure": FigureSpec, "measure": Measure,
         "sweep": SweepSpec, "vary": Vary, "filter": Filter, "printed_cost": PrintedCost,
     },
-    kinds={"sine": SineMotion, "multi_sine": MultiSineMotion, "pick_and_place": CycleMotion, "csv": CsvMotion},
+    kinds=MOTIONS,
     kinds_of="motion",
 )  # fmt: skip
 
 
 def _check_names(campaign: Campaign, file: str) -> None:
     """Names that have to be unique, and names that have to exist."""
-    if not campaign.candidate and campaign.actuated is None:
+    if not campaign.candidate and campaign.actuated is None and campaign.robot is None:
         raise SpecError(f"{file}: candidate: missing; a campaign compares at least one", file=file)
     cases = [case.name for case in campaign.case]
     for name in cases:

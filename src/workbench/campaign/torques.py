@@ -62,11 +62,11 @@ def torques_of(case: Case, names: Iterable[str]) -> Computed:
     ArrayError
         A built-in candidate returns the wrong shape.
     """
-    computed, motion, mechanism = Computed(), case.motion, case.mechanism
+    computed, motion, robot = Computed(), case.motion, case.robot
     for name in names:
-        function = mechanism.candidates[name].function
+        function = robot.candidates[name].function
         try:
-            tau = function(mechanism, motion.q, motion.qd, motion.qdd, case.force)
+            tau = function(robot, motion.q, motion.qd, motion.qdd, case.force)
         except CandidateError as error:
             computed.faults[name] = Fault(str(error), "sample" in error.facts)
             tau = np.full_like(motion.q, np.nan)

@@ -11,7 +11,6 @@ import re
 import statistics
 import time
 import traceback
-from collections import ChainMap
 from collections.abc import Iterable
 from contextlib import nullcontext
 from dataclasses import fields, is_dataclass
@@ -27,8 +26,9 @@ from workbench.campaign.bounded_call import TooSlow, UnrulyError, bounded, said
 from workbench.campaign.candidate_spec import LARGEST_BOUND, CandidateSpec
 from workbench.campaign.formula_files import Siblings, load_module
 from workbench.campaign.spec import Campaign
+from workbench.capabilities.robot import Robot
 from workbench.errors import CandidateError, SpecError, did_you_mean
-from workbench.robots.base import Candidate, Mechanism
+from workbench.robots.closed_form import Candidate
 from workbench.robots.registration import MARK, Registration
 from workbench.schema import NAME, NAME_RULE
 
@@ -77,13 +77,11 @@ class UserCandidate:
         return self._function
 
     def as_candidate(self) -> Candidate:
-        """The same as a candidate of a mechanism."""
+        """The same as a candidate of a robot."""
         about = self.registration
         return Candidate(self.name, about.reference, self, about.description, about.source or self.where)
 
-    def __call__(
-        self, mechanism: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray
-    ) -> FloatArray:
+    def __call__(self, robot: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> FloatArray:
         """Call the function.
 
         Raises
@@ -94,14 +92,12 @@ class UserCandidate:
         given = [_sealed(array) for array in ((q, qd, qdd, force) if self._with_force else (q, qd, qdd))]
         begun = time.perf_counter()
         try:
-            found = bounded(lambda: self._call(mechanism.parameters, given, q.shape), LIMIT_S)
+            found = bounded(lambda: self._call(robot.parameters, given, q.shape), LIMIT_S)
         except UnrulyError as trouble:
             what = f"{trouble} for {len(q)} samples" if isinstance(trouble.error, TooSlow) else str(trouble)
-            raise self._fault(
-                what + _valid_names(trouble.error, mechanism.parameters), trouble.error
-            ) from trouble.error
+            raise self._fault(what + _valid_names(trouble.error, robot.parameters), trouble.error) from trouble.error
         self._taken.append((time.perf_counter() - begun) / max(len(q), 1))
-        return self._checked(found, q.shape, mechanism.joints)
+        return self._checked(found, q.shape, robot.joints)
 
     def _call(self, parameters: Any, given: list[FloatArray], shape: tuple[int, ...]) -> Any:
         """Call the function and turn what it returns into an array, which may run code of the user's as well."""
@@ -262,31 +258,21 @@ def full_names(names: Iterable[str | Path]) -> tuple[str, ...]:
     return tuple(str(Path(name).resolve()) if Path(name).is_file() else str(name) for name in names)
 
 
-class _Offered(ChainMap[str, Candidate]):
-    """A mechanism's own candidates and the user's; keeps the list of those that are wrong on purpose."""
-
-    @property
-    def on_purpose(self) -> Iterable[str]:
-        return getattr(self.maps[1], "on_purpose", ())
-
-
-def offer(mechanism: Mechanism, users: Iterable[UserCandidate]) -> None:
-    """Add a user's candidates to those of one mechanism.
+def offer(robot: Robot, users: Iterable[UserCandidate]) -> None:
+    """Add a user's candidates to those of one robot.
 
     Raises
     ------
     SpecError
-        The mechanism has a candidate of that name already.
+        The robot has a candidate of that name already.
     """
     extra = {}
     for user in users:
-        if user.name in mechanism.candidates:
-            raise SpecError(
-                f'{user.where}: {mechanism.name} already has a candidate "{user.name}"; choose another name'
-            )
+        if user.name in robot.candidates:
+            raise SpecError(f'{user.where}: {robot.name} already has a candidate "{user.name}"; choose another name')
         extra[user.name] = user.as_candidate()
     if extra:
-        vars(mechanism)["candidates"] = _Offered(extra, mechanism.candidates)  # type: ignore[arg-type]
+        robot.offer(extra)
 
 
 def with_rows(campaign: Campaign, users: Iterable[UserCandidate]) -> Campaign:

@@ -10,7 +10,7 @@ SETTING = "NAME=VALUE with a number in SI units"
 RELATIVE = ("*=", "/=", "+=", "-=")
 
 
-def settings(assignments: Iterable[str]) -> tuple[dict[str, float], list[str]]:
+def settings(assignments: Iterable[str], option: str = "--set") -> tuple[dict[str, float], list[str]]:
     """Read ``--set NAME=VALUE`` options, SI units, and ``NAME*=FACTOR`` with its like.
 
     Returns
@@ -30,7 +30,7 @@ def settings(assignments: Iterable[str]) -> tuple[dict[str, float], list[str]]:
     relative: list[str] = []
     names: set[str] = set()
     for assignment in assignments:
-        name, value = _split(assignment, "--set", SETTING)
+        name, value = _split(assignment, option, SETTING)
         if any(operator in assignment for operator in RELATIVE):
             name = parse_assignment(assignment).name
             relative.append(assignment)
@@ -40,9 +40,9 @@ def settings(assignments: Iterable[str]) -> tuple[dict[str, float], list[str]]:
                     raise ValueError  # Python reads 1_000 as a number; here it is a slip
                 found[name] = float(value)
             except ValueError:
-                raise ParameterError(f'--set "{assignment}": expected {SETTING}') from None
+                raise ParameterError(f'{option} "{assignment}": expected {SETTING}') from None
         if name in names:
-            raise ParameterError(f"--set {name} is given twice")
+            raise ParameterError(f"{option} {name} is given twice")
         names.add(name)
     return found, relative
 

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
+from workbench.commands.options import RobotArgument
+
 model = typer.Typer(
     name="model", help="Look at a robot's MJCF, change it, check it, see it move.", no_args_is_help=True
 )
 
-ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="MJCF file, or models/NAME.xml that comes along.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON in place of tables.")]
 CampaignFile = Annotated[
     Path | None, typer.Option("--campaign", metavar="FILE", help="Campaign file with the motion to show.")
@@ -25,7 +26,7 @@ Speed = Annotated[float, typer.Option("--speed", metavar="X", help="1: the motio
 
 
 @model.command()
-def show(path: ModelFile, json: Json = False) -> None:
+def show(path: RobotArgument, json: Json = False) -> None:
     """List every parameter: value, unit, meaning, and the element and attribute of the MJCF that it is read from."""
     from workbench.commands.model_tables import print_json, print_parameters
     from workbench.robots.show import show_parameters
@@ -39,7 +40,7 @@ def show(path: ModelFile, json: Json = False) -> None:
 
 @model.command("set")
 def set_(
-    path: ModelFile,
+    path: RobotArgument,
     changes: Annotated[
         list[str], typer.Argument(metavar="NAME=VALUE...", help="SI; a2*=1.1 scales, also /=, +=, -=; several at once.")
     ],
@@ -51,14 +52,19 @@ def set_(
     NAME_left or NAME_right touches one limb. A bar stays uniform and slender unless its inertia is given too.
     """
     from workbench.commands.model_tables import print_edit
+    from workbench.reference import MujocoReference
     from workbench.robots.edit import edit_file
+    from workbench.robots.load import LoadedModel
 
-    print_edit(edit_file(path, changes, out, in_place))
+    def accept(loaded: LoadedModel) -> None:
+        MujocoReference(loaded.file, loaded=loaded)  # raises where it cannot be assembled at home
+
+    print_edit(edit_file(path, changes, out, in_place, accept))
 
 
 @model.command()
 def check(
-    path: ModelFile,
+    path: RobotArgument,
     campaign: Annotated[
         Path | None,
         typer.Option(
@@ -71,11 +77,12 @@ def check(
 
     Exit code 0: all is well; 1: an assumption is broken or the loops do not close; 2: the file cannot be read.
     """
+    from workbench.campaign.cases import robot_of
     from workbench.campaign.spec import load_campaign
     from workbench.commands.model_tables import print_check, print_json
     from workbench.reference.check import check_model
 
-    found = check_model(path, setup=load_campaign(campaign)[0].setup if campaign else None)
+    found = check_model(path, robot=robot_of(*load_campaign(campaign), path)[0] if campaign else None)
     if json:
         print_json(found)
     else:
@@ -86,7 +93,7 @@ def check(
 
 @model.command()
 def view(
-    path: ModelFile,
+    path: RobotArgument,
     campaign: CampaignFile = None,
     case: CaseName = None,
     start: Start = None,
@@ -106,7 +113,7 @@ def view(
 
 @model.command()
 def render(
-    path: ModelFile,
+    path: RobotArgument,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Picture (.png) or film (.gif, .mp4).")],
     campaign: CampaignFile = None,
     case: CaseName = None,

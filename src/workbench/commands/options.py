@@ -14,6 +14,12 @@ CampaignOrNone = Annotated[
     Path | None,
     typer.Argument(metavar="CAMPAIGN", help="Campaign file (TOML), or the name of one that comes along; none: a list."),
 ]
+RobotArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="ROBOT", help="Folder with a robot.toml, MJCF file, models/NAME.xml, or a name that comes along."
+    ),
+]
 SetInCases = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI; a2*=1.1 scales."),

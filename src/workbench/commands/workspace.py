@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from workbench.commands.assignments import ranges, settings
+from workbench.commands.options import RobotArgument
 
 
 def workspace(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="MJCF file, or models/NAME.xml that comes along.")],
+    model: RobotArgument,
     grid: Annotated[
         float | None, typer.Option(metavar="METRES", help="Edge of a cell. Default: 60 cells along the longest side.")
     ] = None,
@@ -24,6 +24,10 @@ def workspace(
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter, SI; a2*=1.1 scales."),
     ] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option("--at", metavar="COORDINATE=VALUE", help="Hold a rotation, rad. Default: as in the home pose."),
+    ] = None,
     campaign: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Mark where the cases of this campaign run in it.")
     ] = None,
@@ -32,33 +36,34 @@ def workspace(
     ] = None,
 ) -> None:
     """Compute the reachable workspace by discretisation: volume with its error, cells as Parquet, figures."""
-    from workbench.campaign.cases import layered, resolve_cases
+    from workbench.campaign.cases import resolve_cases
     from workbench.campaign.lock import locked
     from workbench.campaign.spec import load_campaign
+    from workbench.capabilities.load import robot_with
     from workbench.console import Steps, print_workspace
     from workbench.report.workspace import draw_workspace
     from workbench.robots.assignments import resolve_changes
-    from workbench.robots.load import load_mechanism
+    from workbench.robots.catalogue import find_source
     from workbench.staging import check_output, staged
     from workbench.workspace.grid import compute_workspace
     from workbench.workspace.store import WORKSPACE, workspace_facts, write_workspace
 
     values, relative = settings(set_ or [])
-    mechanism = load_mechanism(model, **values)
+    robot = robot_with(model, values)
     if relative:
-        changes = resolve_changes(type(mechanism), asdict(mechanism.parameters), relative)
-        mechanism = load_mechanism(model, **layered(values, changes))
-    directory = out or Path("reports") / f"workspace_{mechanism.name}"
+        table = robot.description.table
+        robot = robot_with(model, table.layered(values, resolve_changes(table, robot.values, relative)))
+    directory = out or Path("reports") / f"workspace_{robot.name}"
     check_output(directory, WORKSPACE)
     paths = {}
     if campaign:
         spec, file = load_campaign(campaign)
-        paths = {case.name: case.x for case in resolve_cases(spec, file, model)}
+        paths = {case.name: case.x for case in resolve_cases(spec, file, find_source(model).model)}
     with Steps("computing and drawing the workspace") as show:
         show(0, 2)
-        computed = compute_workspace(mechanism, grid, ranges(limit or []))
+        computed = compute_workspace(robot, grid, ranges(limit or []), settings(at or [], "--at")[0])
         show(1, 2)
         with locked(directory), staged(directory, alone=True) as stage:
-            write_workspace(stage, computed, mechanism)
+            write_workspace(stage, computed, robot)
             draw_workspace(stage, paths)
-    print_workspace(workspace_facts(computed, mechanism), directory)
+    print_workspace(workspace_facts(computed, robot), directory)

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from workbench.errors import ModelError, did_you_mean
+from workbench.mjcf.compile import custom_text
 from workbench.mjcf.text import scan
 
 IGNORABLE = ("contacts", "limits", "springs", "tendons", "free bodies")
@@ -44,6 +45,21 @@ class Setup:
     """bars that lose their rotational inertia in the lumped mass model"""
     ignore: tuple[str, ...] = ()
     """what of `IGNORABLE` is left out of account"""
+
+
+def says_it_itself(model: mujoco.MjModel, setup: Setup) -> bool:
+    """Whether a model holds the set-up already, as the workbench's own do: then it is taken as it is."""
+    if setup.ignore or setup.initial or setup.keyframe:
+        return False
+    texts = {"base_body": setup.base_body, "platform_site": setup.platform_site}
+    if any(custom_text(model, name) != value for name, value in texts.items()):
+        return False
+    if set((custom_text(model, "lumped_bodies") or "").split()) != set(setup.lumped_bodies):
+        return False
+    joints = mujoco.mjtObj.mjOBJ_JOINT
+    on_joints = all(kind == mujoco.mjtTrn.mjTRN_JOINT for kind in map(mujoco.mjtTrn, model.actuator_trntype))
+    driven = [mujoco.mj_id2name(model, joints, int(index)) for index in model.actuator_trnid[:, 0]]
+    return on_joints and tuple(driven) == setup.actuated
 
 
 def prepare(text: str, file: str, setup: Setup, compiled: Compile) -> str:

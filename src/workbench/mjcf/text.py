@@ -49,6 +49,8 @@ class Edit:
     value: float
     token: str = ""
     """its text, where the shortest one does not do"""
+    optional: bool = False
+    """True: passed over where the file does not write it"""
 
 
 def scan(text: str, file: str) -> list[Element]:
@@ -124,12 +126,34 @@ def _located(text: str, raw: bytes, found: list[tuple[str, str, str, str, int, i
 def find(elements: list[Element], tag: str, name: str) -> Element | None:
     """Return the element ``<tag name="...">``; an ``inertial`` is named by its body, an ``option`` by nothing.
 
-    Of several ``option`` elements the last one counts, as in MuJoCo.
+    Of several ``option`` elements the last one counts, as in MuJoCo. A geom may be named by the body whose only geom it
+    is.
     """
     section = SECTIONS.get(tag, "worldbody")
     for element in reversed(elements) if tag == "option" else elements:
         if element.tag == tag and element.section == section and _called(element) == name:
             return element
+    return _only_geom(elements, name) if tag == "geom" and name else None
+
+
+def _only_geom(elements: list[Element], body: str) -> Element | None:
+    geoms = [e for e in elements if e.tag == "geom" and e.section == "worldbody" and e.body == body]
+    return geoms[0] if len(geoms) == 1 else None
+
+
+def written(text: str, elements: list[Element], tag: str, name: str, attribute: str) -> tuple[Element, str] | None:
+    """Where an attribute stands: its element, and the attribute's name there; None where the file does not write it.
+
+    Without an ``<inertial>`` a body's mass is that of its only geom; its inertia may be written as ``fullinertia``.
+    """
+    element = find(elements, tag, name)
+    if element is None and (tag, attribute) == ("inertial", "mass"):
+        element = _only_geom(elements, name)
+    if element is None:
+        return None
+    for spelt in (attribute, *(["fullinertia"] if attribute == "diaginertia" else [])):
+        if attribute_span(text, element, spelt) is not None:
+            return element, spelt
     return None
 
 
@@ -166,8 +190,7 @@ def replace_numbers(text: str, file: str, changes: list[Edit], elements: list[El
     text, file
         The MJCF and the name under which errors speak of it.
     changes
-        What to write. A geom that is not there is passed over, since geoms are for the eye only. Values are written so
-        that they read back bit-equal.
+        What to write. Values are written so that they read back bit-equal.
     elements
         What `scan` found in *text*, where it is known already.
 
@@ -179,28 +202,18 @@ def replace_numbers(text: str, file: str, changes: list[Edit], elements: list[El
     elements = scan(text, file) if elements is None else elements
     edits: dict[tuple[int, int], str] = {}
     for change in changes:
-        element = find(elements, change.tag, change.name)
-        label = element_label(change.tag, change.name)
-        if element is None:
-            if change.tag == "geom":
-                continue
-            raise ModelError(f"{file}: {label} is missing", file=file, element=change.name)
-        found = tokens(text, element, change.attribute)
+        place = written(text, elements, change.tag, change.name, change.attribute)
+        found = tokens(text, *place) if place else []
         if change.index >= len(found):
-            if change.tag == "geom":
+            if change.optional:
                 continue
-            wrong = f"lacks number {change.index + 1}" if found else "is not written"
-            raise ModelError(
-                f"{file}:{element.line}: {label}: {change.attribute} {wrong}; write it out to make it editable",
-                file=file,
-                element=change.name,
-                attribute=change.attribute,
-            )
+            raise _not_written(text, file, change, elements, bool(found))
         start, end, old = found[change.index]
         if "&" in old:
+            assert place is not None
             raise ModelError(
-                f"{file}:{element.line}: {label}: attribute {change.attribute} holds the character reference {old};"
-                " write plain digits to make it editable",
+                f"{file}:{place[0].line}: {element_label(change.tag, change.name)}: attribute {change.attribute} holds"
+                f" the character reference {old}; write plain digits to make it editable",
                 file=file,
             )
         if change.token or not _holds(old, change.value):
@@ -208,6 +221,21 @@ def replace_numbers(text: str, file: str, changes: list[Edit], elements: list[El
     for (start, end), token in sorted(edits.items(), reverse=True):
         text = text[:start] + token + text[end:]
     return text
+
+
+def _not_written(text: str, file: str, change: Edit, elements: list[Element], some: bool) -> ModelError:
+    label = element_label(change.tag, change.name)
+    element = find(elements, change.tag, change.name)
+    facts = {"file": file, "element": change.name, "attribute": change.attribute}
+    if element is None:
+        way = ""
+        if change.tag == "inertial" and find_any(elements, "body", change.name):
+            way = "; MuJoCo computes it from the geoms: write an <inertial> to make it editable"
+        return ModelError(f"{file}: {label} is missing{way}", **facts)
+    wrong = f"lacks number {change.index + 1}" if some else "is not written"
+    return ModelError(
+        f"{file}:{element.line}: {label}: {change.attribute} {wrong}; write it out to make it editable", **facts
+    )
 
 
 def _holds(token: str, value: float) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,14 +16,14 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError, WorkbenchError
 from workbench.mjcf.compile import engine_warnings
-from workbench.mjcf.setup import Setup
-from workbench.reference.closure import CLOSED, LoopCloser, constraint_jacobian
+from workbench.reference.closure import LoopCloser, constraint_jacobian
+from workbench.reference.continuation import CLOSED
 from workbench.reference.engine import Engine
 from workbench.reference.mujoco_reference import Mobility
 from workbench.reference.structure import Structure, read_structure
 from workbench.robots.assumptions.check import Assumption, check_assumptions
-from workbench.robots.base import Mechanism
 from workbench.robots.load import LoadedModel, load_model, open_model
+from workbench.robots.robot_file import RobotFile
 
 SAME_PLACE = 1e-10
 """Metres: largest distance between the platform of the compiled model and of the closed form. The loops are closed to
@@ -93,7 +94,7 @@ class ModelCheck:
         return 1 if self.broken else 0
 
 
-def check_model(path: str | Path, ranges: bool = True, setup: Setup | None = None) -> ModelCheck:
+def check_model(path: str | Path, ranges: bool = True, robot: RobotFile | None = None) -> ModelCheck:
     """Check an MJCF file.
 
     Parameters
@@ -102,8 +103,8 @@ def check_model(path: str | Path, ranges: bool = True, setup: Setup | None = Non
         An MJCF file, or ``models/NAME.xml`` of those that come along.
     ranges
         Look for the reachable range of each active joint, which takes most of the time.
-    setup
-        What a campaign says about a file that names neither mechanism, actuators nor platform.
+    robot
+        What describes a file that has no robot file of its own.
 
     Raises
     ------
@@ -111,7 +112,7 @@ def check_model(path: str | Path, ranges: bool = True, setup: Setup | None = Non
         The file cannot be read, is not safe, or does not compile. Anything else that is wrong is in the result.
     """
     with engine_warnings() as warnings:
-        loaded = load_model(path, setup=setup) if setup else open_model(path)
+        loaded = load_model(path, robot=robot) if robot else open_model(path)
         assumptions = check_assumptions(loaded)
         try:
             reached = _Closed(loaded)
@@ -132,15 +133,15 @@ def check_model(path: str | Path, ranges: bool = True, setup: Setup | None = Non
         problems = list(reached.problems())
         found = reached.ranges() if ranges and not reached.excess else ()
         gap = None
-        if loaded.mechanism is not None and not any(not a.ok for a in assumptions) and not problems:
-            gap, agreement = _agreement(reached, loaded.mechanism, found)
+        if loaded.closed_form is not None and not any(not a.ok for a in assumptions) and not problems:
+            gap, agreement = _agreement(reached, loaded.closed_form, found)
             assumptions.append(agreement)
         warnings += _simulate(loaded.model, reached.closer.home)
     return ModelCheck(
         file=loaded.file,
         mechanism=_name(loaded),
         assumptions=tuple(assumptions),
-        mobility_count=loaded.mechanism.mobility_count() if loaded.mechanism else {},
+        mobility_count=_counted(loaded.closed_form),
         mobility=reached.mobility(),
         idle_bodies=reached.structure.idle,
         closure_residual=reached.residual,
@@ -151,8 +152,14 @@ def check_model(path: str | Path, ranges: bool = True, setup: Setup | None = Non
     )
 
 
+def _counted(closed_form: Any) -> dict[str, int]:
+    """Freedoms by the formula of the robot's source, where it gives one."""
+    count = getattr(closed_form, "mobility_count", None)
+    return count() if count else {}
+
+
 def _name(loaded: LoadedModel) -> str | None:
-    return loaded.kind.name if loaded.kind is not None else None
+    return loaded.description.name if loaded.description is not None else None
 
 
 class _Closed:
@@ -188,7 +195,7 @@ class _Closed:
                 f"{self.loaded.file}: the loops stay open by {self.residual:.3g} m at home (allowed: {CLOSED:g})"
             )
         mobility, active = self.mobility().mobility, len(self.structure.actuated)
-        if mobility > active or (self.loaded.kind is not None and self.excess):
+        if mobility > active or (self.loaded.closed_form is not None and self.excess):
             found.append(f"{self.loaded.file}: mobility {mobility}, but {active} actuators; each freedom needs one")
         elif not mobility:
             found.append(f"{self.loaded.file}: the loops leave no freedom; take an equality out, or add a joint")
@@ -240,9 +247,7 @@ class _Closed:
         return None
 
 
-def _agreement(
-    reached: _Closed, mechanism: Mechanism, ranges: tuple[JointRange, ...]
-) -> tuple[float | None, Assumption]:
+def _agreement(reached: _Closed, closed_form: Any, ranges: tuple[JointRange, ...]) -> tuple[float | None, Assumption]:
     """Compare the platform of the compiled model with the closed form's at random poses on the home branch."""
     home = reached.closer.home[reached.structure.actuated_qpos]
     low = np.array([r.lower for r in ranges]) - home if ranges else np.full(len(home), -NEARBY)
@@ -253,14 +258,14 @@ def _agreement(
         q = home + reach * random.uniform(low, high)
         try:
             model = reached.platform(reached.closer.close(q[None, :]).qpos)
-            closed_form = mechanism.forward_kinematics(q[None, :])
+            expected = closed_form.forward_kinematics(q[None, :])
         except MotionError:  # a pose that one of them cannot take is no place to compare
             continue
         compared += 1
-        distance = float(np.linalg.norm(model - closed_form))
+        distance = float(np.linalg.norm(model - expected))
         if distance >= gap:
             gap, worst = distance, q
-    file, site = reached.loaded.file, mechanism.layout.platform_site
+    file, site = reached.loaded.file, closed_form.layout.platform_site
     where = ", ".join(f"{j} = {v:.6g}" for j, v in zip(reached.structure.joint_names, worst, strict=True))
     if not compared:
         text = f"{file}: no pose that both the model and the closed form can take was found near home"

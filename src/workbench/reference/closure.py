@@ -1,107 +1,34 @@
 """Close the loops: from actuated coordinates to the full configuration, always on the home assembly branch.
 
-Samples need not form a trajectory. Each is reached from a configuration that is known to be on the branch (the home
-pose, or a sample closed before) along a straight line in the actuated coordinates; a step counts only if the correction
-after it is small against the step itself, so that it cannot jump to another branch. What cannot be reached is an error
-that names the sample, never a result.
+How samples are reached, and what keeps them on the branch, stands in `workbench.reference.continuation`.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
+from workbench.reference.along import OrderedClosure
+from workbench.reference.continuation import ASTRAY, CLOSED, NEWTON_STEPS, Assembly
 from workbench.reference.engine import Engine, Evaluator
-from workbench.reference.kernels import integrate, newton_step, predict
+from workbench.reference.kernels import integrate, newton_step
 from workbench.reference.rows import constraint_rows
 from workbench.reference.structure import Structure
 from workbench.reference.tables import tables_of
-
-CLOSED = 1e-13
-"""Largest residual of a closed loop, metres (for turns: radians)."""
-
-CORRECTION = 0.1
-"""A continuation step is accepted when Newton moves the configuration by less than this fraction of the step."""
-
-LONGEST_STEP = 0.2
-"""rad or m, over all joints: a longer step can land on another branch and still look like a good one."""
-
-ALMOST = 1.0 - 1e-9
-"""Steps are cut to this part of the longest, so that rounding does not make them longer."""
-
-NEGLIGIBLE = 1e-7
-"""Corrections below this (rad, m) are accepted whatever the step: they are rounding, not another branch."""
-
-SMALLEST_STEP = 1e-6
-"""Fraction of the way from the start to a sample; a smaller step means that the way is blocked."""
-
-NEWTON_STEPS = 8
-ASTRAY = 1e3
-"""A residual (m) from which Newton does not come back."""
 
 FREE_STEPS = 60
 LONGEST_FREE_STEP = 0.2
 """rad or m: damped, so that an open home pose closes on the branch that it is nearest to."""
 
-SEED_SPACINGS = (576, 24, 1)
-"""One sample in so many, each level reached from the nearest of the level before, the first from the home pose."""
 
-
-@dataclass(frozen=True)
-class Assembly:
-    """Closed configurations of n samples and what is known of the loops there."""
-
-    qpos: FloatArray
-    """``(n, nq)``"""
-    residual: FloatArray
-    """``(n,)`` largest open loop coordinate, m (rad for turns)"""
-    tangent: FloatArray
-    """``(n, nv, na)`` velocities per unit actuated velocity"""
-    rank: np.ndarray
-    """``(n,)`` rank of the loop constraints on the passive freedoms"""
-    condition: FloatArray
-    """``(n,)`` estimate of their condition number"""
-    weakest: np.ndarray
-    """``(n,)`` velocity address of the freedom that they determine worst"""
-
-    @staticmethod
-    def empty(samples: int, nq: int, nv: int, actuated: int) -> Assembly:
-        """Nothing closed yet."""
-        return Assembly(
-            qpos=np.zeros((samples, nq)),
-            residual=np.full(samples, np.inf),
-            tangent=np.zeros((samples, nv, actuated)),
-            rank=np.zeros(samples, dtype=np.int64),
-            condition=np.full(samples, np.inf),
-            weakest=np.zeros(samples, dtype=np.int64),
-        )
-
-    def at(self, rows: np.ndarray | slice) -> Assembly:
-        """Some of the samples; with a slice, views."""
-        return Assembly(*(array[rows] for array in self._arrays()))
-
-    def put(self, rows: np.ndarray, other: Assembly, chosen: np.ndarray | slice = slice(None)) -> None:
-        """Overwrite *rows* by the *chosen* samples of another assembly."""
-        for mine, others in zip(self._arrays(), other._arrays(), strict=True):
-            mine[rows] = others[chosen]
-
-    def _arrays(self) -> tuple[np.ndarray, ...]:
-        return self.qpos, self.residual, self.tangent, self.rank, self.condition, self.weakest
-
-
-class LoopCloser:
+class LoopCloser(OrderedClosure):
     """Closes the loops of one model."""
 
     def __init__(self, engine: Engine, structure: Structure) -> None:
-        self.engine = engine
-        self.structure = structure
-        self.tables = tables_of(engine.model, structure)
-        self.joints = self.tables.joints
-        home = structure.home_qpos[None, :]
-        found = self._newton_alone(home)
+        super().__init__(engine, structure)
+        home = structure.home_qpos[None, :].copy()
+        found = self._newton_alone(home, home[:, structure.actuated_qpos])
         if not found.residual[0] <= CLOSED:
             # edited lengths can put the file's home pose out of reach: move the actuated joints too, but little
             closed, residual = self._close_freely(home.copy())
@@ -112,9 +39,20 @@ class LoopCloser:
                     file=structure.file,
                     value=float(residual[0]),
                 )
-            found = self._newton_alone(closed)
+            found = self._newton_alone(closed, closed[:, structure.actuated_qpos])
         self._home = found
         self.home = found.qpos[0]
+        self.start = self.home[structure.actuated_qpos]
+
+    def close(self, q: FloatArray) -> Assembly:
+        """Close the loops for actuated coordinates ``(n, na)``, SI, any order of samples.
+
+        Raises
+        ------
+        MotionError
+            Naming the first sample that cannot be reached on the home branch, its coordinates and the open loop.
+        """
+        return self.follow(q)
 
     def jacobian(self, qpos: FloatArray) -> FloatArray:
         """Constraint Jacobian ``(m, nv)`` of one configuration ``(nq,)``."""
@@ -125,69 +63,6 @@ class LoopCloser:
         moved = np.empty_like(self.home)
         integrate(self.home, way, self.joints, moved)
         return self.jacobian(self._close_freely(moved[None, :])[0][0])
-
-    def close(self, q: FloatArray) -> Assembly:
-        """Close the loops for actuated coordinates ``(n, na)``, SI, any order of samples.
-
-        Raises
-        ------
-        MotionError
-            Naming the first sample that cannot be reached on the home branch, its coordinates and the open loop.
-        """
-        n = len(q)
-        found = self._nothing(n)
-        known = np.zeros(0, dtype=np.int64)
-        scale = np.maximum(np.ptp(q, axis=0), 1e-9) if n else np.ones(q.shape[1])
-        for spacing in SEED_SPACINGS:
-            wanted = np.setdiff1d(np.arange(0, n, spacing), known)
-            if not len(wanted):
-                continue
-            if len(known):
-                nearest = known[_nearest(q[wanted] / scale, q[known] / scale)]
-                self._reach(q, wanted, found, nearest, found)
-            else:
-                self._reach(q, wanted, self._home, np.zeros(len(wanted), dtype=np.int64), found)
-            known = np.union1d(known, wanted)
-        return found
-
-    def _reach(self, q: FloatArray, wanted: np.ndarray, known: Assembly, origins: np.ndarray, found: Assembly) -> None:
-        """Continuation from rows *origins* of closed configurations to rows *wanted* of *q* and *found*."""
-
-        def block(evaluator: Evaluator, part: slice) -> None:
-            names = wanted[part]
-            found.put(names, self._continue(evaluator, known.at(origins[part]), q[names], names))
-
-        self.engine.in_blocks(block, len(wanted))
-
-    def _continue(self, evaluator: Evaluator, here: Assembly, target: FloatArray, names: np.ndarray) -> Assembly:
-        """Follow straight lines in the actuated coordinates from closed configurations to *target* ``(k, na)``."""
-        origin = here.qpos[:, self.structure.actuated_qpos]
-        way = target - origin
-        done, step = np.zeros(len(target)), np.ones(len(target))
-        active = np.arange(len(target))
-        while len(active):
-            speed = np.linalg.norm(np.matmul(here.tangent[active], way[active, :, None])[:, :, 0], axis=1)
-            with np.errstate(divide="ignore"):
-                longest = ALMOST * LONGEST_STEP / speed
-            part = np.minimum(np.minimum(step[active], 1.0 - done[active]), longest)
-            last = (done[active] + part >= 1.0)[:, None]
-            aim = np.where(last, target[active], origin[active] + way[active] * (done[active] + part)[:, None])
-            moved, predicted = self._predict(here, active, way[active] * part[:, None])
-            predicted[:, self.structure.actuated_qpos] = aim
-            closed = self._newton(evaluator, predicted)
-            correction = np.sqrt(np.sum((closed.qpos - predicted) ** 2, axis=1))
-            small = correction <= np.maximum(CORRECTION * moved, NEGLIGIBLE)
-            accepted = (closed.residual <= CLOSED) & small & (moved <= LONGEST_STEP)
-            here.put(active[accepted], closed, accepted)
-            done[active[accepted]] += part[accepted]
-            step[active[accepted]] *= 2.0
-            refused = active[~accepted]
-            step[refused] = 0.5 * part[~accepted]
-            blocked = active[np.where(accepted, longest, step[active]) < SMALLEST_STEP]
-            if len(blocked):
-                self._refuse(int(names[blocked[0]]), target[blocked[0]], here.qpos[blocked[0]])
-            active = active[done[active] < 1.0]
-        return here
 
     def _close_freely(self, qpos: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Close one configuration ``(1, nq)`` by least-norm Newton steps on all joints, the actuated ones included."""
@@ -203,16 +78,11 @@ class LoopCloser:
             integrate(qpos[0], step, self.joints, qpos[0])
         return qpos, residual
 
-    def _predict(self, here: Assembly, rows: np.ndarray, change: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Tangent predictor: distance moved by a change of the actuated coordinates, and where that leads."""
-        moved, out = np.empty(len(rows)), np.empty((len(rows), here.qpos.shape[1]))
-        predict(here.qpos[rows], here.tangent[rows], change, self.joints, out, moved)
-        return moved, out
-
-    def _newton(self, evaluator: Evaluator, start: FloatArray) -> Assembly:
+    def _newton(self, evaluator: Evaluator, start: FloatArray, aim: FloatArray) -> Assembly:
         """Newton on the passive joints of up to a block of configurations; the actuated coordinates stay."""
         count = len(start)
-        found = self._nothing(count)
+        start[:, self.structure.actuated_qpos] = aim
+        found = self._nothing(count, aim.shape[1])
         qpos = evaluator.qpos
         qpos[:count] = start
         # the floor: a closed sample gets one more step, which takes it to rounding; then it stays
@@ -228,26 +98,17 @@ class LoopCloser:
                 break
         return found
 
-    def _newton_alone(self, qpos: FloatArray) -> Assembly:
-        """`_newton` on one configuration ``(1, nq)``, outside of a block."""
-        results: list[Assembly] = []
-        self.engine.in_blocks(lambda evaluator, _: results.append(self._newton(evaluator, qpos)), 1)
-        return results[0]
-
-    def _nothing(self, samples: int) -> Assembly:
-        model = self.engine.model
-        return Assembly.empty(samples, model.nq, model.nv, len(self.structure.actuated))
-
-    def _refuse(self, sample: int, q: FloatArray, nearest: FloatArray) -> None:
-        reached = nearest[self.structure.actuated_qpos]
-        joint = int(np.argmax(np.abs(q - reached)))
-        shown = ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.structure.joint_names, q, strict=True))
+    def _refuse(self, sample: int, target: FloatArray, reached: FloatArray, there: Assembly) -> None:
+        joint = int(np.argmax(np.abs(target - reached)))
+        shown = ", ".join(
+            f"{name} = {value:.6g}" for name, value in zip(self.structure.joint_names, target, strict=True)
+        )
         raise MotionError(
             f"sample {sample}, joint {self.structure.joint_names[joint]}: the loops cannot be closed at {shown}; the"
-            f" way from the home pose ends at {reached[joint]:.6g}",
+            f" way there ends at {reached[joint]:.6g}",
             sample=sample,
             joint=self.structure.joint_names[joint],
-            value=q.tolist(),
+            value=target.tolist(),
             reached=reached.tolist(),
         )
 
@@ -269,10 +130,3 @@ def constraint_jacobian(
     jacobian, residual = np.zeros((structure.rows, poses.cdof.shape[1])), np.zeros(structure.rows)
     constraint_rows(tables.closures, tables.joints, qpos[0], *(array[0] for array in poses.tables), jacobian, residual)
     return jacobian, residual
-
-
-def _nearest(points: FloatArray, seeds: FloatArray) -> np.ndarray:
-    """Index of the nearest seed for each point; a tree, so that memory stays linear in the number of samples."""
-    from scipy.spatial import cKDTree
-
-    return np.asarray(cKDTree(seeds).query(points)[1])

@@ -142,13 +142,14 @@ def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, t
 def projection(  # type: ignore[no-untyped-def]
     closures, joints, split, bodies, poses, dynamics, mass_layout, platform, masses, gravity, base_rotation,
     base_position, qpos, qvel, tangent, qdd, applied, qacc, tau, velocity_residual, acceleration_residual, motion,
-    reactions,
+    turning, reactions,
 ):  # fmt: skip
     """Accelerations, actuator torques, platform motion and reaction forces of a block.
 
     With W the tangent (J W = 0), tau = W^T (M qacc + bias - applied): the constraint forces do no work along W. Their
     least-norm values come from the same factor as qacc and are the loop reactions. ``mass`` holds M's lower triangle.
-    ``motion (3, n, 3)`` receives x, xd, xdd; ``reactions (loops + joints, n, 3)`` forces, both in the base's frame.
+    ``motion (3, n, 3)`` receives x, xd, xdd; ``turning``, three arrays, the platform site's rotation ``(n, 3, 3)``, its
+    angular velocity and acceleration ``(n, 3)``; ``reactions (loops + joints, n, 3)`` forces; all in the base's frame.
     """
     cdof, com, site_xpos, site_xquat, anchors = poses
     cdof_dot, mass, bias, damping, body_com = dynamics
@@ -215,10 +216,25 @@ def projection(  # type: ignore[no-untyped-def]
             motion[0, s, k] = px * rx + py * ry + pz * rz
             motion[1, s, k] = vx * rx + vy * ry + vz * rz
             motion[2, s, k] = ax * rx + ay * ry + az * rz
+        _turning(base_rotation, site_xquat[s, site], v[body], acc[body], turning, s)
         _reactions(
             blocks, block_rows, bodies, masses, gravity, base_rotation, body, com[s], body_com[s], v, acc, multipliers,
             applied[s], carried, reactions, s,
         )  # fmt: skip
+
+
+@inlined
+def _turning(base_rotation, quaternion, v, acc, turning, s):  # type: ignore[no-untyped-def]
+    """Rotation, angular velocity and angular acceleration of a site (unit quaternion, world) in the base's frame."""
+    rotation, omega, alpha = turning
+    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    for k in range(3):
+        rx, ry, rz = base_rotation[0, k], base_rotation[1, k], base_rotation[2, k]
+        rotation[s, k, 0] = rx * (1.0 - 2.0 * (y * y + z * z)) + ry * 2.0 * (x * y + w * z) + rz * 2.0 * (x * z - w * y)
+        rotation[s, k, 1] = rx * 2.0 * (x * y - w * z) + ry * (1.0 - 2.0 * (x * x + z * z)) + rz * 2.0 * (y * z + w * x)
+        rotation[s, k, 2] = rx * 2.0 * (x * z + w * y) + ry * 2.0 * (y * z - w * x) + rz * (1.0 - 2.0 * (x * x + y * y))
+        omega[s, k] = v[0] * rx + v[1] * ry + v[2] * rz
+        alpha[s, k] = acc[0] * rx + acc[1] * ry + acc[2] * rz
 
 
 @inlined

@@ -164,8 +164,8 @@ class PinocchioLoops:
         x, _, rank, _ = np.linalg.lstsq(jacobian[:, self.passive], right, rcond=RANK)
         return np.asarray(x, dtype=np.float64), int(rank)
 
-    def close(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Close the loops for actuated coordinates ``(n, na)``, in any order of samples.
+    def close(self, q: FloatArray, ordered: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Close the loops for actuated coordinates ``(n, na)``: in any order of samples, or as one motion, in order.
 
         Returns
         -------
@@ -187,7 +187,10 @@ class PinocchioLoops:
             start = pool[nearest]
             if sample and np.sum(((q[sample - 1] - aim) / scale) ** 2) < np.sum(((known[nearest] - aim) / scale) ** 2):
                 start = configurations[sample - 1]
-            found = self._reach(start, aim) or self._reach(self.home, aim)
+            if ordered and sample:
+                found = self._reach(configurations[sample - 1], aim)
+            else:
+                found = self._reach(start, aim) or self._reach(self.home, aim)
             if found is None:
                 self._refuse(sample, aim)
             else:

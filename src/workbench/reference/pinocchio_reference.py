@@ -20,7 +20,7 @@ from workbench.mjcf.setup import Setup
 from workbench.reference.pinocchio_loops import PinocchioLoops
 from workbench.reference.pinocchio_reader import import_pinocchio, read, without_inertia
 from workbench.reference.structure import CONNECT, SPIN, WELD, read_structure
-from workbench.robots.load import load_model
+from workbench.robots.load import LoadedModel, load_model
 
 MASS_MODELS = ("distributed", "lumped")
 
@@ -56,6 +56,8 @@ class PinocchioReference:
         MJCF file; ``<custom>`` names ``base_body``, ``platform_site`` and ``lumped_bodies``.
     setup
         Actuated joints, platform and first guess of a file whose ``<custom>`` does not name them.
+    loaded
+        The same model with the same overrides where it is at hand.
     **parameters
         Overrides by name, SI, as for `workbench.load_mechanism`.
 
@@ -73,9 +75,16 @@ class PinocchioReference:
     Coulomb friction is its full value against the direction of motion, and zero at rest.
     """
 
-    def __init__(self, path: str | Path, *, setup: Setup | None = None, **parameters: float) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        loaded: LoadedModel | None = None,
+        setup: Setup | None = None,
+        **parameters: float,
+    ) -> None:
         self._pin = import_pinocchio()
-        loaded = load_model(path, parameters, setup)
+        loaded = loaded or load_model(path, parameters, setup)
         self.file = loaded.file
         self._compiled = loaded.model
         structure = self._structure = read_structure(loaded.model, loaded.file)
@@ -103,6 +112,7 @@ class PinocchioReference:
         qdd: ArrayLike,
         mass_model: str = "distributed",
         external_force: ArrayLike | None = None,
+        ordered: bool = False,
     ) -> PinocchioResult:
         """Actuator forces that produce a motion.
 
@@ -115,6 +125,8 @@ class PinocchioReference:
             ``"distributed"``, the model as it is, or ``"lumped"``, bars without rotational inertia.
         external_force
             Newtons, base (paper) frame, acting on the platform site: ``(3,)`` or ``(n, 3)``.
+        ordered
+            The samples are one motion, in the order of time: each is closed from its predecessor.
 
         Raises
         ------
@@ -132,7 +144,7 @@ class PinocchioReference:
         model = self._model(mass_model)
         data = model.createData()
         damping, friction = np.array(model.damping), np.array(model.friction)
-        configurations, closure = loops.close(q)
+        configurations, closure = loops.close(q, ordered)
         base = self._base()
         tau, motion = np.zeros((n, na)), np.zeros((3, n, 3))
         residuals, ranks = np.zeros((2, n)), np.zeros(n, dtype=np.int64)

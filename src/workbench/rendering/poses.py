@@ -12,7 +12,6 @@ from workbench.arrays import FloatArray
 from workbench.campaign.cases import course_of, resolve_cases
 from workbench.campaign.spec import load_campaign
 from workbench.errors import MotionError, WorkbenchError
-from workbench.reference import MujocoReference
 from workbench.reference.closure import LoopCloser
 from workbench.reference.engine import Engine
 from workbench.reference.structure import read_structure
@@ -91,6 +90,6 @@ def motion_poses(
             " motion, or fewer frames a second"
         )
     times = start + step * np.arange(int(count) + 1, dtype=np.float64)
-    reference = MujocoReference(path, threads=1, loaded=None, setup=found.setup, **found.overrides)
-    qpos = reference.inverse_dynamics(*course_of(found)(times)).qpos
+    reference = found.robot.reference
+    qpos = reference.inverse_dynamics(*course_of(found)(times), along=times).qpos
     return Poses(reference.text, reference.compiled(), qpos, times, f"{path}, {found.name}")

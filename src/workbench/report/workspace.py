@@ -25,7 +25,7 @@ NEAR_SINGULAR = 0.1
 
 
 def draw_workspace(directory: Path, paths: Mapping[str, FloatArray] | None = None) -> list[Path]:
-    """Draw ``sections`` and ``space`` as SVG and PNG into ``figures/`` of a stored workspace.
+    """Draw ``sections`` and ``space``, or a planar robot's ``map``, as SVG and PNG into ``figures/``.
 
     Parameters
     ----------
@@ -49,7 +49,8 @@ def draw_workspace(directory: Path, paths: Mapping[str, FloatArray] | None = Non
     folder.mkdir(exist_ok=True)
     written = []
     with figure_style():
-        for name, figure in (("sections", _sections(facts, cells, marked)), ("space", _space(facts, cells, marked))):
+        drawn = {"sections": _sections, "space": _space} if len(facts["shape"]) == 3 else {"map": _map}
+        for name, figure in ((name, draw(facts, cells, marked)) for name, draw in drawn.items()):
             for suffix in ("svg", "png"):
                 path = folder / f"workspace_{name}.{suffix}"
                 figure.savefig(path, dpi=150, metadata={"Date": None} if suffix == "svg" else None)
@@ -66,8 +67,9 @@ def _looks(count: int) -> list[dict[str, Any]]:
 def _grid(facts: Mapping[str, Any], cells: pd.DataFrame) -> NDArray[np.int64]:
     """0 out of reach, 1 in reach, 2 in reach and near a singular pose."""
     grid = np.zeros(facts["shape"], dtype=np.int64)
-    index = cells[["i1", "i2", "i3"]].to_numpy()
-    smallest = np.min([np.abs(cells[f"measure_{name}"].to_numpy()) for name in facts["measures"]], axis=0)
+    index = cells[[f"i{k + 1}" for k in range(len(facts["shape"]))]].to_numpy()
+    measured = [np.abs(cells[f"measure_{name}"].to_numpy()) for name in facts["measures"]]
+    smallest = np.min(measured, axis=0) if measured else np.ones(len(cells))
     grid[tuple(index.T)] = np.where(smallest < NEAR_SINGULAR, 2, 1)
     return grid
 
@@ -107,6 +109,36 @@ def _sections(facts: Mapping[str, Any], cells: pd.DataFrame, paths: Mapping[str,
     if paths:
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=min(len(paths), 5))
+    return figure
+
+
+def _map(facts: Mapping[str, Any], cells: pd.DataFrame, paths: Mapping[str, FloatArray]) -> Figure:
+    """The area of a planar robot, or the range of one that moves along a line."""
+    grid, names = _grid(facts, cells), facts["axes"]
+    low, step = facts["low_m"], float(facts["spacing_m"])
+    if grid.ndim == 1:
+        grid, names, low = grid[:, None], [*names, ""], [*low, 0.0]
+    upright = names.index(facts["down"] or facts["up"]) if (facts["down"] or facts["up"]) in names else 1
+    across = 1 - upright
+    figure = new_figure(6.5, 5.5)
+    figure.set_layout_engine("constrained")
+    axes = figure.add_subplot()
+    plane = grid.T if across == 0 else grid
+    ends = [(float(low[i]), float(low[i]) + step * grid.shape[i]) for i in (across, upright)]
+    extent = (*ends[0], *ends[1])
+    colours = ListedColormap(["#ffffff", "#bcd9ea", "#7ba7c4"])
+    axes.imshow(plane, origin="lower", extent=extent, cmap=colours, vmin=0, vmax=2, interpolation="nearest")
+    for look, (name, x) in zip(_looks(len(paths)), paths.items(), strict=True):
+        axes.plot(x[:, across], x[:, upright], linewidth=1.0, label=name, **look)
+    axes.set_xlabel(f"{names[across]} [m]")
+    axes.set_ylabel(f"{names[upright]} [m]" if names[upright] else "")
+    held = ", ".join(f"{name} = {value:.4g}" for name, value in facts["held"].items())
+    axes.set_title(held and f"at {held}", color=INK)
+    if facts["down"] == names[upright]:
+        axes.invert_yaxis()
+    axes.grid(visible=False)
+    if paths:
+        axes.legend(loc="best")
     return figure
 
 

@@ -1,22 +1,5 @@
-"""Closed forms of parallel mechanisms. Nothing in this package imports MuJoCo."""
+"""Robots: a folder each, of an MJCF, a robot file and formulas; read, changed and checked here.
 
-from __future__ import annotations
-
-from importlib import import_module
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from workbench.robots.base import Mechanism
-
-MECHANISMS: dict[str, str] = {
-    "asym_2rss_ppap": "workbench.robots.asym_2rss_ppap.closed_form:Asym2rssPpap",
-    "planar_4rprp": "workbench.robots.planar_4rprp.closed_form:Planar4Rprp",
-}
-"""name in ``<custom><text name="mechanism">`` -> where its class is; imported when first asked for."""
-
-
-def mechanism_class(name: str) -> type[Mechanism]:
-    """Return the class of a mechanism by its name in `MECHANISMS`."""
-    module, _, attribute = MECHANISMS[name].partition(":")
-    found: type[Mechanism] = getattr(import_module(module), attribute)
-    return found
+What describes a robot to the reference and to campaigns stands in the files of this package; each sub-package is one
+robot, and nothing above knows it by name.
+"""

@@ -5,13 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from workbench.errors import ParameterError
-from workbench.robots.parameters import expand_names, stored_names
-
-if TYPE_CHECKING:
-    from workbench.robots.base import Mechanism
+from workbench.robots.parameters import ParameterTable
 
 ASSIGNMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*([*/+-]?=)\s*(\S+)\s*")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
@@ -53,33 +49,29 @@ def parse_assignment(text: str) -> Assignment:
     return Assignment(name, operator, number)
 
 
-def resolve_changes(
-    mechanism: type[Mechanism], values: Mapping[str, float], changes: Sequence[str]
-) -> dict[str, float]:
-    """Turn changes as a user writes them into new values by stored name (``a2_left``).
+def resolve_changes(table: ParameterTable, values: Mapping[str, float], changes: Sequence[str]) -> dict[str, float]:
+    """Turn changes as a user writes them into new values by parameter (``a2_left``).
 
     Parameters
     ----------
-    mechanism, values
-        What the model describes, and its parameters as they stand.
+    table, values
+        The robot's parameters, and their values as they stand.
     changes
-        Each as for `parse_assignment`. ``NAME`` of a sided parameter changes both limbs, each from its own value; where
-        ``NAME_left`` or ``NAME_right`` is given too, that limb follows it.
+        Each as for `parse_assignment`. The name of a group changes all its members, each from its own value; a member
+        that is given too follows that.
 
     Raises
     ------
     ParameterError
         Unknown name, the same name twice, or not a change.
     """
-    stored = stored_names(mechanism.parameter_table)
     parsed = [parse_assignment(text) for text in changes]
     seen: set[str] = set()
     result: dict[str, float] = {}
-    for change in sorted(parsed, key=lambda c: c.name in stored):
+    for change in sorted(parsed, key=lambda c: c.name in table.infos):
         if change.name in seen:
             raise ParameterError(f"parameter {change.name} is given twice", parameter=change.name)
         seen.add(change.name)
-        names = expand_names(mechanism.parameter_table, {change.name: 0.0})
-        for name in names:
+        for name in table.members(change.name):
             result[name] = OPERATIONS[change.operator](values[name], change.number) + 0.0
     return result

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import stat
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.errors import ModelError, OutputError, ParameterError
-from workbench.mjcf.compile import find_model
+from workbench.errors import OutputError, ParameterError
 from workbench.robots.assignments import parse_assignment, resolve_changes
+from workbench.robots.catalogue import find_source
 from workbench.robots.inertia import refuse_impossible_bodies
-from workbench.robots.load import LoadedModel, confirm, load_model, load_text
-from workbench.robots.parameters import changed_parameters, stored_names
+from workbench.robots.load import LoadedModel, load_edited, no_parameters, read_base, refuse_computed
 from workbench.robots.values import rewrite
+
+COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
+NUMBER = re.compile(r"(?<![\w.-])\d+\.?\d*(?:[eE][-+]?\d+)?(?!\w)")
+MILLIMETRES = 1000.0
+"""Comments give lengths in millimetres as well as in metres."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +43,12 @@ class EditResult:
     changes: tuple[Change, ...]
     lines: tuple[int, ...]
     """numbers of the lines that changed, from 1"""
+    stale: tuple[int, ...] = ()
+    """lines of comments that name a number as it was before"""
 
 
 def resolve_for(path: str | Path, changes: Sequence[str]) -> dict[str, float]:
-    """`resolve_changes` for a model file: what ``--set`` hands to `workbench.robots.load.load_model` as overrides.
+    """`resolve_changes` for a robot: what ``--set`` hands to `workbench.robots.load.load_model` as overrides.
 
     Raises
     ------
@@ -50,14 +57,18 @@ def resolve_for(path: str | Path, changes: Sequence[str]) -> dict[str, float]:
     """
     for text in changes:
         parse_assignment(text)
-    loaded = _describing(path)
-    assert loaded.kind is not None
-    assert loaded.values is not None
-    return resolve_changes(loaded.kind, loaded.values, changes)
+    loaded = read_base(path).loaded
+    if loaded.description is None or loaded.values is None:
+        raise no_parameters(loaded.file)
+    return resolve_changes(loaded.description.table, loaded.values, changes)
 
 
 def edit_file(
-    path: str | Path, changes: Sequence[str], out: str | Path | None = None, in_place: bool = False
+    path: str | Path,
+    changes: Sequence[str],
+    out: str | Path | None = None,
+    in_place: bool = False,
+    accept: Callable[[LoadedModel], object] = lambda _: None,
 ) -> EditResult:
     """Change parameters of an MJCF file.
 
@@ -67,13 +78,15 @@ def edit_file(
     Parameters
     ----------
     path
-        The model, which has to keep the closed form's assumptions.
+        The robot, whose model has to keep what its formulas take for granted.
     changes
         ``a2=0.31``, ``a2*=1.1``, ``m1_left+=0.1`` ..., SI; several at once.
     out
         File to write; replaced where it exists.
     in_place
-        Write *path* itself. Exactly one of *out* and *in_place* is needed.
+        Write the model itself. Exactly one of *out* and *in_place* is needed.
+    accept
+        Called with the new model before it is written; raises where it is none that can be used.
 
     Returns
     -------
@@ -97,43 +110,47 @@ def edit_file(
         raise ParameterError("no change is given; allowed: NAME=VALUE, NAME*=FACTOR, /=, +=, -=")
     for text in changes:
         parse_assignment(text)
-    source = find_model(path)
-    if in_place and source != Path(path):
+    found = find_source(path)
+    source = found.model
+    if (in_place and found.robot is not None and found.robot.builtin) or (in_place and str(source) != found.shown):
         raise OutputError(f"{path} comes with the workbench and is not changed in place; write to another file")
     target = source if out is None else Path(out)
     _refuse_target(target)
-    loaded = _describing(path)
-    assert loaded.kind is not None
-    assert loaded.values is not None
-    given = resolve_changes(loaded.kind, loaded.values, changes)
-    wanted = changed_parameters(loaded.kind, loaded.values, given)
-    refuse_impossible_bodies(loaded.model, loaded.kind, loaded.file, loaded.values, wanted)
-    text = rewrite(loaded.text, loaded.file, loaded.kind, loaded.values, wanted)
-    confirm(load_text(text, loaded.file).model, loaded.kind, loaded.file, wanted)
+    base = read_base(path)
+    loaded, values = base.loaded, base.loaded.values
+    if loaded.description is None or values is None:
+        raise no_parameters(loaded.file)
+    described = loaded.description
+    given = resolve_changes(described.table, values, changes)
+    wanted = described.table.changed(values, given)
+    refuse_computed(base, given, values)
+    refuse_impossible_bodies(base.model, described, loaded.file, values, wanted)
+    text = rewrite(base.model, loaded.source_text, loaded.file, described, values, wanted, base.elements)
+    edited = load_edited(base, text, wanted)
+    accept(edited)
     _write(target, text, source)
-    units = {name: info.unit for name, info in stored_names(loaded.kind.parameter_table).items()}
+    after = edited.values or wanted
     moved = tuple(
-        Change(name, units[name], loaded.values[name], value)
-        for name, value in wanted.items()
-        if value != loaded.values[name]
+        Change(name, info.unit, values[name], after[name])
+        for name, info in described.table.infos.items()
+        if after[name] != values[name]
     )
-    return EditResult(source, target, moved, changed_lines(loaded.text, text))
+    return EditResult(source, target, moved, changed_lines(loaded.source_text, text), tuple(_stale(text, moved)))
+
+
+def _stale(text: str, moved: Sequence[Change]) -> Iterator[int]:
+    """Lines of comments in which a number stands that a parameter no longer has."""
+    old = {size * change.before for change in moved for size in (1.0, MILLIMETRES if change.unit == "m" else 1.0)}
+    for comment in COMMENT.finditer(text):
+        for number in NUMBER.finditer(text, comment.start(1), comment.end(1)):
+            if float(number.group()) in old and len(number.group().strip("0.")) > 1:
+                yield text.count("\n", 0, number.start()) + 1
 
 
 def changed_lines(before: str, after: str) -> tuple[int, ...]:
     """Numbers, from 1, of the lines in which two versions of a model differ; an edit keeps the number of lines."""
     pairs = zip(before.split("\n"), after.split("\n"), strict=True)
     return tuple(index for index, (old, new) in enumerate(pairs, start=1) if old != new)
-
-
-def _describing(path: str | Path) -> LoadedModel:
-    loaded = load_model(path)
-    if loaded.kind is None:
-        raise ModelError(
-            f'{path}: parameters cannot be set, <custom> has no <text name="mechanism"> that says what they mean',
-            file=str(path),
-        )
-    return loaded
 
 
 def _refuse_target(target: Path) -> None:

@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 
 from workbench.errors import ParameterError
-from workbench.robots.base import Mechanism
-from workbench.robots.parameters import Target, stored_names
-from workbench.robots.values import target_number, vector
+from workbench.robots.description import Description
+from workbench.robots.parameters import Target
+from workbench.robots.values import vector
 
 SMALLEST = float(mujoco.mjMINVAL)
 """Smallest mass (kg) and inertia (kg m^2) of a body that moves, MuJoCo's own limit."""
@@ -21,7 +21,7 @@ OTHERS = 3
 
 def refuse_impossible_bodies(
     model: mujoco.MjModel,
-    mechanism: type[Mechanism],
+    description: Description,
     file: str,
     values: Mapping[str, float],
     wanted: Mapping[str, float],
@@ -30,8 +30,8 @@ def refuse_impossible_bodies(
 
     Parameters
     ----------
-    model, mechanism, file, values
-        The model before the change, what it describes, its name, and its parameters by stored name.
+    model, description, file, values
+        The model before the change, what it describes, its name, and its parameters by name.
     wanted
         The parameters after it.
 
@@ -40,11 +40,11 @@ def refuse_impossible_bodies(
     ParameterError
         Naming the parameter, its value, the body and what is allowed.
     """
-    units = {name: info.unit for name, info in stored_names(mechanism.parameter_table).items()}
-    for body, attribute, targets in _changed(mechanism, values, wanted):
+    units = {name: info.unit for name, info in description.table.infos.items()}
+    for body, attribute, targets in _changed(description, values, wanted):
         numbers = vector(model, targets[0], file).copy()
         for target in targets:
-            numbers[target.index] = target_number(target, wanted)
+            numbers[target.index] = target.number(wanted)
         name = next(n for n in reversed(targets[0].of) if wanted[n] != values[n])
         others = [f"{n} = {wanted[n]:.9g}" for n in wanted if n != name and wanted[n] != values[n]]
         after = f" (with {', '.join(others[:OTHERS])}{' ...' if len(others) > OTHERS else ''})" if others else ""
@@ -67,12 +67,12 @@ def refuse_impossible_bodies(
 
 
 def _changed(
-    mechanism: type[Mechanism], values: Mapping[str, float], wanted: Mapping[str, float]
+    description: Description, values: Mapping[str, float], wanted: Mapping[str, float]
 ) -> Iterator[tuple[str, str, list[Target]]]:
     """Bodies whose mass or inertia changes: name, attribute, and the targets in it, those that change first."""
     groups: dict[tuple[str, str], list[Target]] = {}
-    for target in mechanism.targets:
-        if target.element == "inertial" and target.attribute in ("mass", "diaginertia"):
+    for target in description.targets:
+        if target.element == "inertial" and target.attribute in ("mass", "diaginertia") and not target.optional:
             groups.setdefault((target.name, target.attribute), []).append(target)
     for (body, attribute), targets in groups.items():
         targets.sort(key=lambda t: all(wanted[n] == values[n] for n in t.of))

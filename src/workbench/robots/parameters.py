@@ -1,25 +1,19 @@
-"""The parameters of a mechanism: what each means and may be, where it lives in the MJCF, and what follows a change.
+"""The parameters of a robot: what each means and may be, where it lives in the MJCF, and what follows a change.
 
-Nothing here knows MuJoCo. A mechanism *describes* where its parameters live in an MJCF (`Target`);
+Nothing here knows MuJoCo. A robot file *describes* where its parameters live in an MJCF (`Target`);
 `workbench.robots.load` reads and writes them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from workbench.errors import ParameterError, did_you_mean
 from workbench.limits import LARGEST_NUMBER
-
-if TYPE_CHECKING:
-    from workbench.robots.base import Mechanism
-
-SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)
@@ -30,12 +24,21 @@ class ParameterInfo:
     unit: str
     meaning: str
     source: str = ""
-    sided: bool = False
-    """True: stored as ``name_left`` and ``name_right``; the bare name sets both."""
     minimum: float = -math.inf
     minimum_allowed: bool = True
     """False: the minimum itself is refused (a length of zero)."""
     maximum: float = math.inf
+    maximum_allowed: bool = True
+
+    @property
+    def allowed(self) -> str:
+        """The values that it may have, in words."""
+        bounds = []
+        if self.minimum > -math.inf:
+            bounds.append(f"{'>=' if self.minimum_allowed else '>'} {self.minimum:g}")
+        if self.maximum < math.inf:
+            bounds.append(f"{'<=' if self.maximum_allowed else '<'} {self.maximum:g}")
+        return " and ".join(bounds)
 
 
 @dataclass(frozen=True)
@@ -45,18 +48,24 @@ class Target:
     Parameters
     ----------
     element
-        MJCF tag: ``body``, ``inertial`` (named by its body), ``site``, ``geom``, ``joint`` or ``option``.
+        MJCF tag: ``body``, ``inertial`` (named by its body), ``site``, ``geom``, ``joint`` or ``option``; or
+        ``distance``, which is computed from two sites and stands nowhere.
     name
-        The element's name; for ``inertial`` its body's; for ``option`` the empty string.
+        The element's name; for ``inertial`` its body's; for ``option`` the empty string; for ``distance`` both
+        sites, a line each.
     attribute, index
-        The attribute and the position of the number in it.
+        The attribute and the position of the number in it; -1 is the length of the whole vector (gravity).
     factor
-        Constant factor, a sign or a power of two, so that reading it back loses nothing.
+        Constant factor, a sign or a power of two where it is read, so that reading it back loses nothing.
     of
         The parameters whose product, times factor, is the number.
     reads
         The parameter that is read back from this number, by dividing the others out; None for targets that only follow
         (visible geoms, the second bar of a parallelogram).
+    words
+        The place as the robot file writes it.
+    optional
+        True: passed over where the file does not write it, as visible geoms may be.
     """
 
     element: str
@@ -66,103 +75,132 @@ class Target:
     factor: float
     of: tuple[str, ...]
     reads: str | None = None
+    words: str = ""
+    optional: bool = False
+
+    def number(self, values: Mapping[str, float]) -> float:
+        """The number that has to stand here for these parameters."""
+        return self.factor * math.prod(values[name] for name in self.of)
 
 
 @dataclass(frozen=True)
-class UniformRule:
-    """Changing a parameter in ``when`` sets those in ``sets``, unless they (or one in ``unless``) are given too.
+class Bar:
+    """A bar that stays uniform and slender when its mass or length changes: parameters by name.
 
-    A bar whose mass or length changes stays a uniform slender bar.
+    Its mass centre then lies at half its length and its transverse inertia about it is mass length^2 / 12, unless an
+    inertia of it is given too.
     """
 
-    when: tuple[str, ...]
-    sets: Mapping[str, Callable[[Mapping[str, float]], float]]
-    unless: tuple[str, ...] = ()
+    mass: str
+    length: str
+    half: bool = False
+    """True: *length* names half of the bar's length"""
+    inertia: tuple[str, ...] = ()
+    centre: str | None = None
+    """fraction of the length at which the mass centre lies"""
+
+    def follow(self, values: Mapping[str, float]) -> dict[str, float]:
+        """What mass and length make of inertia and mass centre."""
+        length = values[self.length] * (2.0 if self.half else 1.0)
+        found = dict.fromkeys(self.inertia, values[self.mass] * length**2 / 12)
+        return found | ({self.centre: 0.5} if self.centre else {})
 
 
-def stored_names(table: tuple[ParameterInfo, ...]) -> dict[str, ParameterInfo]:
-    """Map each stored field name (``a2_left`` ...) to its description."""
-    names: dict[str, ParameterInfo] = {}
-    for info in table:
-        for name in [f"{info.name}_{side}" for side in SIDES] if info.sided else [info.name]:
-            names[name] = info
-    return names
+@dataclass(frozen=True)
+class ParameterTable:
+    """All parameters of a robot, names that set several at once, and what keeps bars uniform."""
 
+    infos: Mapping[str, ParameterInfo]
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    bars: tuple[Bar, ...] = ()
 
-def expand_names(table: tuple[ParameterInfo, ...], changes: Mapping[str, float]) -> dict[str, float]:
-    """Resolve ``NAME`` to ``NAME_left`` and ``NAME_right`` where the parameter is sided; one-sided names win.
+    def expand(self, changes: Mapping[str, float]) -> dict[str, float]:
+        """Resolve names of groups to their members; a member that is named itself goes over its group.
 
-    Raises
-    ------
-    ParameterError
-        Unknown name (with the nearest valid one), or a value that is not a real number.
-    """
-    stored = stored_names(table)
-    sided = {info.name for info in table if info.sided}
-    result: dict[str, float] = {}
-    for name in sorted(changes, key=lambda n: n in stored):
-        if isinstance(changes[name], bool) or not isinstance(changes[name], int | float | np.floating | np.integer):
-            raise ParameterError(f"parameter {name}: {changes[name]!r} is not a number", parameter=name)
-        try:
-            value = float(changes[name])
-        except OverflowError:  # an integer with more than 308 digits
-            value = math.inf if changes[name] > 0 else -math.inf
-        if name in stored:
-            result[name] = value
-        elif name in sided:
-            result |= {f"{name}_{side}": value for side in SIDES}
-        else:
-            raise ParameterError(f'unknown parameter "{name}"{did_you_mean(name, {*stored, *sided})}', parameter=name)
-    return result
+        Raises
+        ------
+        ParameterError
+            Unknown name (with the nearest valid one), or a value that is not a real number.
+        """
+        result: dict[str, float] = {}
+        for name in sorted(changes, key=lambda n: n in self.infos):
+            if isinstance(changes[name], bool) or not isinstance(changes[name], int | float | np.floating | np.integer):
+                raise ParameterError(f"parameter {name}: {changes[name]!r} is not a number", parameter=name)
+            try:
+                value = float(changes[name])
+            except OverflowError:  # an integer with more than 308 digits
+                value = math.inf if changes[name] > 0 else -math.inf
+            result |= dict.fromkeys(self.members(name), value)
+        return result
 
+    def members(self, name: str) -> tuple[str, ...]:
+        """The parameters that a name stands for.
 
-def check_parameters(table: tuple[ParameterInfo, ...], values: Mapping[str, float]) -> None:
-    """Refuse values that are not finite, larger than `LARGEST_NUMBER`, or outside the table's range.
-
-    Raises
-    ------
-    ParameterError
-        Naming the parameter, its value, its unit and what is allowed.
-    """
-    for name, info in stored_names(table).items():
-        value = values[name]
-        low = value < info.minimum or (value == info.minimum and not info.minimum_allowed)
-        if not abs(value) <= LARGEST_NUMBER or low or value > info.maximum:
-            bounds = []
-            if info.minimum > -math.inf:
-                bounds.append(f"{'>=' if info.minimum_allowed else '>'} {info.minimum:g}")
-            if info.maximum < math.inf:
-                bounds.append(f"<= {info.maximum:g}")
-            if not bounds or value > LARGEST_NUMBER:
-                bounds.append(f"at most {LARGEST_NUMBER:g} in size")
-            allowed = " and ".join(bounds)
-            unit = f" {info.unit}" if info.unit not in ("", "1") else ""
+        Raises
+        ------
+        ParameterError
+            Unknown name, with the nearest valid one.
+        """
+        if name in self.infos:
+            return (name,)
+        if name in self.groups:
+            return self.groups[name]
+        if not self.infos:
             raise ParameterError(
-                f"parameter {name} = {value:g}{unit}; allowed: {allowed} ({info.meaning})",
+                f'unknown parameter "{name}"; this robot has none: a robot file lists them, [parameters.{name}]',
                 parameter=name,
-                value=value,
             )
+        hint = did_you_mean(name, {*self.infos, *self.groups})
+        raise ParameterError(f'unknown parameter "{name}"{hint}', parameter=name)
 
+    def check(self, values: Mapping[str, float]) -> None:
+        """Refuse values that are not finite, larger than `LARGEST_NUMBER`, or outside a parameter's range.
 
-def changed_parameters(
-    mechanism: type[Mechanism], values: Mapping[str, float], changes: Mapping[str, float]
-) -> dict[str, float]:
-    """Apply *changes* to *values* with the uniform-bar rules, and check the result.
+        Raises
+        ------
+        ParameterError
+            Naming the parameter, its value, its unit and what is allowed.
+        """
+        for name, info in self.infos.items():
+            value = values[name]
+            low = value < info.minimum or (value == info.minimum and not info.minimum_allowed)
+            high = value > info.maximum or (value == info.maximum and not info.maximum_allowed)
+            if not abs(value) <= LARGEST_NUMBER or low or high:
+                bounds = [info.allowed] if info.allowed else []
+                if not bounds or value > LARGEST_NUMBER:
+                    bounds.append(f"at most {LARGEST_NUMBER:g} in size")
+                unit = f" {info.unit}" if info.unit not in ("", "1") else ""
+                meaning = f" ({info.meaning})" if info.meaning else ""
+                raise ParameterError(
+                    f"parameter {name} = {value:g}{unit}; allowed: {' and '.join(bounds)}{meaning}",
+                    parameter=name,
+                    value=value,
+                )
 
-    Raises
-    ------
-    ParameterError
-        Unknown name, or a value out of range.
-    """
-    given = expand_names(mechanism.parameter_table, changes)
-    result = {**values, **given}
-    check_parameters(mechanism.parameter_table, result)
-    for rule in mechanism.uniform_rules:
-        moved = any(name in given and given[name] != values[name] for name in rule.when)
-        if not moved or any(name in given for name in rule.unless):
-            continue
-        for name, value in rule.sets.items():
-            if name not in given:
-                result[name] = value(result)
-    check_parameters(mechanism.parameter_table, result)
-    return result
+    def changed(self, values: Mapping[str, float], changes: Mapping[str, float]) -> dict[str, float]:
+        """Apply *changes* to *values*, keep bars uniform, and check the result.
+
+        Raises
+        ------
+        ParameterError
+            Unknown name, or a value out of range.
+        """
+        given = self.expand(changes)
+        result = {**values, **given}
+        self.check(result)
+        for bar in self.bars:
+            moved = any(name in given and given[name] != values[name] for name in (bar.mass, bar.length))
+            if moved and not any(name in given for name in bar.inertia):
+                result |= {name: value for name, value in bar.follow(result).items() if name not in given}
+        self.check(result)
+        return result
+
+    def layered(self, *layers: Mapping[str, float]) -> dict[str, float]:
+        """Merge changes, later layers over earlier ones; a later group also goes over an earlier member of it."""
+        merged: dict[str, float] = {}
+        for layer in layers:
+            for name in layer:
+                for member in self.groups.get(name, ()):
+                    merged.pop(member, None)
+            merged |= layer
+        return merged

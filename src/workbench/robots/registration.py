@@ -18,6 +18,17 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 MARK = "__workbench_candidate__"
 """attribute of a function that was registered"""
 
+CLASS_MARK = "__workbench_closed_form__"
+"""attribute of a class that was registered"""
+
+Class = TypeVar("Class", bound=type)
+
+
+def closed_form(kind: Class) -> Class:
+    """Register a `ClosedForm`, kinematics and inverse dynamics of the robot of its folder."""
+    setattr(kind, CLASS_MARK, True)
+    return kind
+
 
 @dataclass(frozen=True)
 class Registration:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.errors import ModelError
-from workbench.mjcf.text import find, scan
-from workbench.robots import MECHANISMS
-from workbench.robots.load import load_model
-from workbench.robots.parameters import Target, stored_names
+from workbench.mjcf.text import find, scan, written
+from workbench.robots.load import no_parameters, read_base
+from workbench.robots.parameters import Target
 
-SCALARS = ("mass", "damping", "frictionloss", "armature")
+SCALARS = ("mass", "damping", "frictionloss", "armature", "stiffness", "density")
 """Attributes that hold one number."""
 
 
@@ -36,32 +34,35 @@ class ParameterRow:
     """line of the element in the file"""
     places: int
     """how many numbers of the MJCF follow from the parameter, visible geoms included"""
+    settable: bool = True
+    """False: MuJoCo computes it from other numbers of the file"""
 
 
 def show_parameters(path: str | Path) -> list[ParameterRow]:
-    """List the parameters of a model in the order of the mechanism's table.
+    """List the parameters of a robot in the order of its robot file.
 
     Parameters
     ----------
     path
-        An MJCF file that names its mechanism, or ``models/NAME.xml`` of those that come along.
+        A robot: folder, robot file, MJCF, or the name of one that comes along.
 
     Raises
     ------
     ModelError, ParameterError
-        See `workbench.robots.load.load_model`; or the model names no mechanism.
+        See `workbench.robots.load.load_model`; or no robot file goes with the model.
     """
-    loaded = load_model(path)
-    if loaded.kind is None or loaded.values is None:
-        raise ModelError(
-            f'{path}: <custom> has no <text name="mechanism">; valid: {", ".join(MECHANISMS)}', file=str(path)
-        )
-    elements = scan(loaded.text, loaded.file)
-    read_from = {target.reads: target for target in loaded.kind.targets if target.reads}
+    base = read_base(path)
+    loaded = base.loaded
+    if loaded.description is None or loaded.values is None:
+        raise no_parameters(loaded.file)
+    elements = scan(loaded.source_text, loaded.file)
+    targets = loaded.description.targets
+    read_from = {target.reads: target for target in targets if target.reads}
     rows = []
-    for name, info in stored_names(loaded.kind.parameter_table).items():
+    for name, info in loaded.description.table.infos.items():
         target = read_from[name]
-        element = find(elements, target.element, target.name)
+        place = written(loaded.source_text, elements, target.element, target.name, target.attribute)
+        element = place[0] if place else find(elements, target.element, target.name)
         rows.append(
             ParameterRow(
                 name=name,
@@ -69,19 +70,28 @@ def show_parameters(path: str | Path) -> list[ParameterRow]:
                 unit=info.unit,
                 meaning=info.meaning,
                 source=info.source,
-                element=_element(target),
-                attribute=target.attribute if target.attribute in SCALARS else f"{target.attribute}[{target.index}]",
+                element=_element(target, place[0].tag if place else target.element),
+                attribute=_attribute(target, place[1] if place else target.attribute),
                 rule=_rule(target),
                 line=element.line if element else None,
-                places=sum(name in other.of for other in loaded.kind.targets),
+                places=sum(name in other.of for other in targets),
+                settable=name not in base.computed,
             )
         )
     return rows
 
 
-def _element(target: Target) -> str:
+def _attribute(target: Target, attribute: str) -> str:
+    if attribute in SCALARS or target.element == "distance" or target.index < 0:
+        return attribute
+    return f"{attribute}[{target.index}]"
+
+
+def _element(target: Target, tag: str) -> str:
     if target.element == "inertial":
-        return f"inertial of {target.name}"
+        return f"{tag} of {target.name}"
+    if target.element == "distance":
+        return f"distance {' '.join(target.name.split())}"
     return f"{target.element} {target.name}".rstrip()
 
 

@@ -6,7 +6,6 @@ one thing only: which of several fractions, whose products with a length are the
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from decimal import Context, Decimal
@@ -22,13 +21,14 @@ from workbench.mjcf.text import (
     Edit,
     Element,
     element_label,
-    find,
     replace_numbers,
     significant_digits,
     tokens,
+    written,
 )
-from workbench.robots.base import Mechanism
-from workbench.robots.parameters import Target, check_parameters
+from workbench.robots.description import Description
+from workbench.robots.parameters import Target
+from workbench.robots.places import WHOLE
 
 FIELDS = {
     ("body", "pos"): (mujoco.mjtObj.mjOBJ_BODY, "body_pos"),
@@ -39,6 +39,7 @@ FIELDS = {
     ("joint", "damping"): (mujoco.mjtObj.mjOBJ_JOINT, "dof_damping"),
     ("joint", "frictionloss"): (mujoco.mjtObj.mjOBJ_JOINT, "dof_frictionloss"),
     ("joint", "armature"): (mujoco.mjtObj.mjOBJ_JOINT, "dof_armature"),
+    ("joint", "stiffness"): (mujoco.mjtObj.mjOBJ_JOINT, "jnt_stiffness"),
 }
 """Where the compiled model keeps an attribute."""
 
@@ -90,6 +91,8 @@ def vector(model: mujoco.MjModel, target: Target, file: str) -> FloatArray:
     """
     if target.element == "option":
         return np.asarray(getattr(model.opt, target.attribute), dtype=np.float64)
+    if target.element == "distance":
+        return np.atleast_1d(_distance(model, target, file))
     if (target.element, target.attribute) == ("inertial", "diaginertia"):
         return np.diag(inertia_matrix(model, index_of(model, mujoco.mjtObj.mjOBJ_BODY, "body", target.name, file)))
     kind, field = FIELDS[target.element, target.attribute]
@@ -100,27 +103,58 @@ def vector(model: mujoco.MjModel, target: Target, file: str) -> FloatArray:
     return np.atleast_1d(getattr(model, field)[index])
 
 
-def target_number(target: Target, values: Mapping[str, float]) -> float:
-    """The number that a target has to hold for these parameters."""
-    return target.factor * math.prod(values[name] for name in target.of)
+def _distance(model: mujoco.MjModel, target: Target, file: str) -> float:
+    """Between two sites, in the model as drawn."""
+    ids = [index_of(model, mujoco.mjtObj.mjOBJ_SITE, "site", name, file) for name in target.name.split("\n")]
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return float(np.linalg.norm(data.site_xpos[ids[0]] - data.site_xpos[ids[1]]))
+
+
+def read_number(model: mujoco.MjModel, target: Target, file: str, text: str, elements: list[Element]) -> float:
+    """The number at a place: from the compiled model, but for geoms, which MuJoCo keeps in another form, from the text.
+
+    Raises
+    ------
+    ModelError
+        The element is missing, or a geom's number is not written.
+    """
+    if target.element == "geom":
+        place = written(text, elements, "geom", target.name, target.attribute)
+        found = tokens(text, *place) if place else []
+        if target.index >= len(found):
+            raise ModelError(
+                f'{file}: "{target.words}" is not written; write {target.attribute} out at the geom, or name another'
+                " place",
+                file=file,
+                element=target.name,
+                attribute=target.attribute,
+            )
+        return float(found[target.index][2])
+    numbers = vector(model, target, file)
+    return float(np.linalg.norm(numbers)) if target.index == WHOLE else float(numbers[target.index])
+
+
+def is_written(text: str, elements: list[Element], target: Target) -> bool:
+    """Whether a number stands literally in the file, so that it can be set; else MuJoCo computes it from others."""
+    if target.element == "distance":
+        return False
+    place = written(text, elements, target.element, target.name, target.attribute)
+    return place is not None and len(tokens(text, *place)) > max(target.index, 0)
 
 
 def read_parameters(
-    model: mujoco.MjModel,
-    mechanism: type[Mechanism],
-    file: str,
-    text: str = "",
-    elements: list[Element] | None = None,
+    model: mujoco.MjModel, description: Description, file: str, text: str, elements: list[Element]
 ) -> dict[str, float]:
     """Read every parameter from the compiled model.
 
     Parameters
     ----------
-    model, mechanism, file
+    model, description, file
         Compiled MJCF, what it describes, and its name for messages.
     text, elements
-        The MJCF's text and what `workbench.mjcf.text.scan` found in it; without them a fraction written with more than
-        17 digits is read as the shortest one with that product.
+        The MJCF's text and what `workbench.mjcf.text.scan` found in it: a fraction may be written with more than the 17
+        digits of a double, to say which of several fractions with the same product is meant.
 
     Raises
     ------
@@ -130,20 +164,20 @@ def read_parameters(
         A value that the parameter may not have.
     """
     values: dict[str, float] = {}
-    for target in sorted((t for t in mechanism.targets if t.reads), key=lambda t: len(t.of)):
-        found = float(vector(model, target, file)[target.index])
+    for target in sorted((t for t in description.targets if t.reads), key=lambda t: len(t.of)):
+        found = read_number(model, target, file, text, elements)
         assert target.reads is not None
         others = math.prod(values[name] for name in target.of if name != target.reads)
-        token = _token(text, elements, target) if elements and len(target.of) > 1 else ""
+        token = _token(text, elements, target) if len(target.of) > 1 else ""
         value = _exact_quotient(token, found, target.factor, others)
         values[target.reads] = (quotient(found / target.factor, others) if value is None else value) + 0.0
-    check_parameters(mechanism.parameter_table, values)
-    return {f.name: values[f.name] for f in dataclasses.fields(mechanism.parameter_type)}
+    description.table.check(values)
+    return {name: values[name] for name in description.table.infos}
 
 
 def _token(text: str, elements: list[Element], target: Target) -> str:
-    element = find(elements, target.element, target.name)
-    found = tokens(text, element, target.attribute) if element else []
+    place = written(text, elements, target.element, target.name, target.attribute)
+    found = tokens(text, *place) if place else []
     return found[target.index][2] if target.index < len(found) else ""
 
 
@@ -179,35 +213,57 @@ def precise(target: Target, values: Mapping[str, float]) -> str:
     if target.reads is None or len(target.of) == 1:
         return ""
     others = math.prod(values[name] for name in target.of if name != target.reads)
-    if quotient(target_number(target, values) / target.factor, others) == values[target.reads]:
+    if quotient(target.number(values) / target.factor, others) == values[target.reads]:
         return ""
     exact = PRECISE.multiply(Decimal(target.factor), Decimal(values[target.reads]))
     exact = PRECISE.multiply(exact, Decimal(others))
     texts = (f"{exact:.{digits}g}" for digits in PRECISE_DIGITS)
-    return next((text for text in texts if float(text) == target_number(target, values)), "")
+    return next((text for text in texts if float(text) == target.number(values)), "")
 
 
 def rewrite(
+    model: mujoco.MjModel,
     text: str,
     file: str,
-    mechanism: type[Mechanism],
+    description: Description,
     values: Mapping[str, float],
     new: Mapping[str, float],
-    elements: list[Element] | None = None,
+    elements: list[Element],
 ) -> str:
-    """Return the MJCF text with parameters changed from *values* to *new*, all by stored name; see `replace_numbers`.
+    """Return the MJCF text with parameters changed from *values* to *new*; see `replace_numbers`.
+
+    Places that the file does not write follow from others, or disagree with them, which is looked at after compiling.
 
     Raises
     ------
     ModelError
         An element or attribute that is missing.
     """
-    edits = [
-        Edit(t.element, t.name, t.attribute, t.index, target_number(t, new), precise(t, new))
-        for t in mechanism.targets
-        if any(new[name] != values[name] for name in t.of)
-    ]
+    edits = []
+    for target in description.targets:
+        if target.element == "distance" or all(new[name] == values[name] for name in target.of):
+            continue
+        changed = target.reads is not None and new[target.reads] != values[target.reads]
+        optional = target.optional or (not changed and not is_written(text, elements, target))
+        index, factor = target.index, 1.0
+        if index == WHOLE:
+            index, factor = _only_component(vector(model, target, file), target, file)
+        number = factor * target.number(new)
+        edits.append(Edit(target.element, target.name, target.attribute, index, number, precise(target, new), optional))
     return replace_numbers(text, file, edits, elements) if edits else text
+
+
+def _only_component(numbers: FloatArray, target: Target, file: str) -> tuple[int, float]:
+    """Index and sign of the one component of a vector that is not zero."""
+    index = int(np.argmax(np.abs(numbers)))
+    if np.count_nonzero(numbers) != 1:
+        shown = " ".join(f"{value:g}" for value in numbers)
+        raise ModelError(
+            f'{file}: <{target.element} {target.attribute}="{shown}"> has not one component, so its size alone cannot'
+            f' be set; name an axis, "{target.words} z"',
+            file=file,
+        )
+    return index, 1.0 if numbers[index] > 0 else -1.0
 
 
 def target_label(target: Target) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.campaign.cases import resolve_cases
+from workbench.campaign.cases import base_robot, resolve_cases
 from workbench.campaign.compare import compute_case
 from workbench.campaign.evidence import Effort
 from workbench.campaign.spec import Campaign
@@ -76,12 +76,13 @@ def estimate(
     common = common_key(campaign, file, plan.model, settings, effort, campaign.sweep.keep_series, users)
     context = Context(campaign, file, plan.model, settings, effort, plan.recipe, common, names)
     indices = np.unique(np.linspace(0, plan.count - 1, TRIED).astype(int)).tolist()
-    evaluate(context, users, task_of(plan, indices[0]))  # the first one compiles
+    base = base_robot(campaign, file, plan.model, users)[0]
+    evaluate(context, base, task_of(plan, indices[0]))  # the first one compiles
     taken: list[float] = []
     lines = series = filtered = failed = 0
     for index in indices:
         begun = time.perf_counter()
-        answer = evaluate(context, users, task_of(plan, index))
+        answer = evaluate(context, base, task_of(plan, index))
         taken.append(time.perf_counter() - begun)
         lines += len(answer.record.line())
         series += len(answer.series or b"")

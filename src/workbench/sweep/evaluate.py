@@ -7,7 +7,7 @@ import dataclasses
 import hashlib
 import io
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from workbench.campaign.cases import Case, layered, resolve_case
+from workbench.campaign.cases import Case, base_robot, resolve_case
 from workbench.campaign.compare import CaseResult, Row, compute_case
 from workbench.campaign.evidence import Effort
 from workbench.campaign.spec import Campaign, CaseSpec
-from workbench.campaign.user_candidates import UserCandidate, load_candidates
+from workbench.campaign.user_candidates import load_candidates
 from workbench.campaign.verdict import FAILURES
-from workbench.errors import MotionError, WorkbenchError
-from workbench.reference import MujocoReference
+from workbench.capabilities.robot import Robot
+from workbench.errors import MotionError, SpecError, WorkbenchError
 from workbench.sweep.identity import case_key, common_key
 from workbench.sweep.plan import Recipe
 from workbench.sweep.record import FAILED, FILTERED, INVALID, PASSED, Record, lost
@@ -81,23 +81,27 @@ class Context:
         here = common_key(self.campaign, self.file, self.model, self.settings, self.effort, self.keep_series, users)
         if here != self.common:
             raise WorkbenchError("model, formulas, code or versions of this worker are not those of the run")
+        base = base_robot(self.campaign, self.file, self.model, users)[0]
         with contextlib.suppress(WorkbenchError):
-            self._warm_up(users)
-        return partial(evaluate, self, users)
+            self._warm_up(base)
+        return partial(evaluate, self, base)
 
-    def _warm_up(self, users: Sequence[UserCandidate]) -> None:
+    def overrides(self, robot: Robot, spec: CaseSpec) -> dict[str, float]:
+        """Parameters of a case, over those of the campaign and under those of the command line."""
+        return robot.description.table.layered(self.campaign.parameters, spec.parameters, self.settings)
+
+    def _warm_up(self, base: Robot) -> None:
         """Compile what is compiled on first use, so that no case's time and memory are charged for it."""
-        overrides = layered(self.campaign.parameters, self.campaign.case[0].parameters, self.settings)
-        case = resolve_case(self.campaign, self.campaign.case[0], self.file, self.model, overrides, users)
-        reference = MujocoReference(case.model, threads=1, loaded=case.loaded, setup=case.setup, **overrides)
+        spec = self.campaign.case[0]
+        case = resolve_case(spec, self.file, base, self.model, self.overrides(base, spec))
         q, qd, qdd = (values[:2] for values in (case.motion.q, case.motion.qd, case.motion.qdd))
         for mass_model in dict.fromkeys(c.reference for c in self.campaign.candidate):
-            reference.inverse_dynamics(q, qd, qdd, mass_model)
-            case.mechanism.inverse_dynamics(q, qd, qdd, mass_model)
+            case.robot.reference.inverse_dynamics(q, qd, qdd, mass_model)
+            case.robot.inverse_dynamics(q, qd, qdd, mass_model)
 
 
-def evaluate(context: Context, users: Sequence[UserCandidate], task: Task) -> Answer:
-    """Compute one case; errors come back as data.
+def evaluate(context: Context, base: Robot, task: Task) -> Answer:
+    """Compute one case of the robot *base*; errors come back as data.
 
     Raises
     ------
@@ -110,9 +114,9 @@ def evaluate(context: Context, users: Sequence[UserCandidate], task: Task) -> An
     filters = context.campaign.sweep.filter if context.campaign.sweep else None
     try:
         spec = CaseSpec.model_validate(content)
-        overrides = layered(context.campaign.parameters, spec.parameters, context.settings)
+        overrides = context.overrides(base, spec)
         try:
-            case = resolve_case(context.campaign, spec, context.file, context.model, overrides, users)
+            case = resolve_case(spec, context.file, base, context.model, overrides)
         except MotionError as error:
             status = FILTERED if filters and filters.inside_workspace else FAILED
             return Answer(lost(index, key, status, str(error)))
@@ -146,7 +150,12 @@ def series_bytes(result: CaseResult) -> bytes:
 
 
 def _nearest_singularity(case: Case) -> tuple[float, str]:
-    measures = case.mechanism.singularity_measures(case.motion.q)
+    measures = case.robot.singularity_measures(case.motion.q)
+    if not measures:
+        raise SpecError(
+            "filter.singularity: this robot has no measure of singular poses; state platform.coordinates in its robot"
+            " file, as many as it has freedoms"
+        )
     return min((float(np.abs(values).min()), name) for name, values in measures.items())
 
 

@@ -10,15 +10,29 @@ from pathlib import Path
 from typing import Any
 
 from workbench.campaign import provenance
-from workbench.campaign.cases import locate
+from workbench.campaign.cases import locate, robot_files
 from workbench.campaign.evidence import Effort
+from workbench.campaign.motion_spec import TableMotion
+from workbench.campaign.robot_spec import RobotKeys
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate
 
 FORMAT = 1
 """Version of the files of a sweep and of its keys."""
 
-CODE = ("mjcf", "robots", "motion", "reference", "campaign", "sweep", "metrics.py", "arrays.py", "dry_friction.py")
+CODE = (
+    "mjcf",
+    "robots",
+    "capabilities",
+    "motion",
+    "delimited",
+    "reference",
+    "campaign",
+    "sweep",
+    "metrics.py",
+    "arrays.py",
+    "dry_friction.py",
+)
 """The workbench's own code that makes numbers: two states of it may carry the same version number."""
 
 DESCRIBING = ("name", "title", "description")
@@ -31,7 +45,7 @@ def code_hash() -> str:
     digest = hashlib.sha256()
     for pattern in CODE:
         for found in sorted(root.glob(pattern)):
-            for path in sorted(found.rglob("*.py")) if found.is_dir() else [found]:
+            for path in sorted([*found.rglob("*.py"), *found.rglob("*.toml")]) if found.is_dir() else [found]:
                 digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
@@ -52,12 +66,14 @@ def common_key(
 ) -> str:
     """Hash of everything that the cases of a sweep share."""
     motion = campaign.case[0].motion
-    table = provenance.sha256(locate(file, motion.file, "motion.file").read_bytes()) if motion.kind == "csv" else ""
+    table = ""
+    if isinstance(motion, TableMotion):
+        table = provenance.sha256(locate(file, motion.file, "motion.file").read_bytes())
     filters = campaign.sweep.filter.model_dump() if campaign.sweep else {}
     return _digest(
         {
             "versions": versions(),
-            "model": provenance.sha256(model.read_bytes()),
+            "robot": [provenance.sha256(path.read_bytes()) for path in robot_files(campaign, file, model)],
             "table": table,
             "candidates": [candidate.model_dump(exclude={"printed_cost"}) for candidate in campaign.candidate],
             "parameters": campaign.parameters,
@@ -66,8 +82,7 @@ def common_key(
             "budget": effort.budget,
             "filter": filters,
             "keep_series": keep_series,
-            "setup": repr(campaign.setup),
-            "read": campaign.read,
+            "keys": campaign.model_dump(include=set(RobotKeys.model_fields) - {"model", "robot"}),
             "users": {
                 user.name: provenance.sha256(b"".join(file.read_bytes() for file in user.files)) for user in users
             },

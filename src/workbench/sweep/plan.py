@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from workbench.arrays import FloatArray
-from workbench.campaign.cases import layered, locate, mechanism_with, resolve_cases
+from workbench.campaign.cases import base_robot, resolve_cases
 from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.user_candidates import UserCandidate
+from workbench.capabilities.robot import Robot
 from workbench.errors import MotionError, SpecError
-from workbench.robots.base import Mechanism
 from workbench.sweep.samples import sweep_values
 from workbench.sweep.vary import SPEED, Change, resolve_key
 
@@ -54,7 +54,7 @@ class Plan:
     recipe: Recipe
     values: FloatArray
     """``(cases, keys)``"""
-    mechanism: Mechanism
+    robot: Robot
     """the robot before the sweep changes it"""
     model: Path
 
@@ -93,26 +93,20 @@ def plan_sweep(
     """
     assert campaign.sweep is not None
     base = campaign.case[0]
-    path = model or locate(file, campaign.model, "model")
+    plain, path = base_robot(campaign, file, model, users)
+    table = plain.description.table
     try:
-        mechanism = resolve_cases(campaign, file, model, (), settings, (), users)[0].mechanism
+        robot = resolve_cases(campaign, file, model, (), settings, (), users)[0].robot
     except MotionError:  # the case as it stands need not be within reach; its variants may be
-        mechanism = mechanism_with(path, layered(campaign.parameters, base.parameters, settings), campaign)
-    values = {name: float(value) for name, value in vars(mechanism.parameters).items()}
+        robot = plain.with_parameters(**table.layered(campaign.parameters, base.parameters, settings))
     case = base.model_dump()
     changes: list[Change] = []
     for vary in campaign.sweep.vary:
-        if campaign.setup and vary.key.startswith("parameters."):
-            raise SpecError(
-                f'{file}: sweep: key "{vary.key}": parameters of this MJCF cannot be set; allowed: motion,'
-                " external_force, speed",
-                key=vary.key,
-            )
         try:
-            change = resolve_key(vary, case, mechanism.parameter_table, values)
+            change = resolve_key(vary, case, table, robot.values)
         except SpecError as error:
             raise SpecError(f"{file}: {error}", **error.facts) from error
-        clash = sorted(change.parameters.keys() & _stored(mechanism, settings))
+        clash = sorted(change.parameters.keys() & set(table.expand(settings)))
         if clash:
             raise SpecError(f'{file}: sweep: key "{vary.key}": --set sets {clash[0]} in every case', key=vary.key)
         hidden = next((c for c in changes if c.parameters and c.parameters.keys() <= change.parameters.keys()), None)
@@ -121,10 +115,4 @@ def plan_sweep(
                 f'{file}: sweep: key "{hidden.key}" has no effect: "{change.key}" sets it too, after it', key=hidden.key
             )
         changes.append(change)
-    return Plan(Recipe(base.name[:80], case, tuple(changes)), sweep_values(campaign.sweep), mechanism, path)
-
-
-def _stored(mechanism: Mechanism, settings: Mapping[str, float]) -> set[str]:
-    from workbench.robots.parameters import expand_names
-
-    return set(expand_names(mechanism.parameter_table, settings))
+    return Plan(Recipe(base.name[:80], case, tuple(changes)), sweep_values(campaign.sweep), robot, path)

@@ -271,14 +271,14 @@ def _lost(context: Context, plan: Plan, index: int, found: Lost) -> Answer:
 
 
 def _manifest(campaign: Campaign, file: Path, plan: Plan, summary: Mapping[str, Any]) -> dict[str, Any]:
-    return describe(campaign, file, plan.model, plan.mechanism) | {
+    return describe(campaign, file, plan.model, plan.robot) | {
         "format": store.FORMAT,
         "status": "passed" if passed(summary["counts"]) else "failed",
         "candidates": {
             c.name: {
-                "mass_model": plan.mechanism.candidates[c.name].mass_model,
-                "description": plan.mechanism.candidates[c.name].description,
-                "source": plan.mechanism.candidates[c.name].source,
+                "mass_model": plan.robot.candidates[c.name].mass_model,
+                "description": plan.robot.candidates[c.name].description,
+                "source": plan.robot.candidates[c.name].source,
             }
             for c in campaign.candidate
         },

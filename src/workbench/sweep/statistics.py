@@ -14,7 +14,6 @@ import pyarrow.parquet as pq
 from workbench.arrays import FloatArray
 from workbench.campaign.spec import Campaign
 from workbench.campaign.verdict import CONTRAST
-from workbench.robots.parameters import stored_names
 from workbench.sweep import files
 from workbench.sweep.identity import FORMAT
 from workbench.sweep.plan import Plan
@@ -84,7 +83,7 @@ def _statuses(directory: Path) -> tuple[Counter[str], Counter[tuple[str, str]], 
 
 def _errors(directory: Path, plan: Plan, campaign: Campaign) -> dict[tuple[str, str], dict[str, FloatArray]]:
     """Peak errors by candidate and reference, then by joint, ``(cases,)``; NaN where a case has none."""
-    joints = plan.mechanism.joints
+    joints = plan.robot.joints
     pairs = [(c.name, c.reference) for c in campaign.candidate]
     found = {pair: {joint: np.full(plan.count, np.nan) for joint in joints} for pair in pairs}
     for path in sorted((directory / files.SUMMARY).glob("part-*.parquet")):
@@ -120,7 +119,7 @@ def _distribution(values: FloatArray, plan: Plan, limits: Sequence[float]) -> di
 
 def _key(plan: Plan, column: int, campaign: Campaign) -> dict[str, Any]:
     change, values = plan.recipe.changes[column], plan.values[:, column]
-    infos = stored_names(plan.mechanism.parameter_table)
+    infos = plan.robot.description.table.infos
     info = next((infos[name] for name in change.parameters), None)
     assert campaign.sweep is not None
     factor = change.relative
@@ -181,7 +180,7 @@ def _worst(pair: tuple[str, str], table: dict[str, FloatArray], plan: Plan) -> l
             "reference": pair[1],
             "case": plan.recipe.case_name(int(i)),
             "peak_error": float(error[i]),
-            "joint": max(plan.mechanism.joints, key=lambda joint: float(table[joint][i])),
+            "joint": max(plan.robot.joints, key=lambda joint: float(table[joint][i])),
             "values": dict(zip(plan.keys, plan.numbers(int(i)), strict=True)),
         }
         for i in order

@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from workbench.campaign.cases import layered
 from workbench.campaign.sweep_spec import Vary
 from workbench.errors import ParameterError, SpecError, did_you_mean
-from workbench.robots.parameters import ParameterInfo, expand_names
+from workbench.robots.parameters import ParameterTable
 
 SPEED = "speed"
 PATH = re.compile(r"(motion|external_force)(?:\.([A-Za-z_]+))?((?:\[\d+\])*)")
@@ -44,7 +43,10 @@ def _faster_cycle(motion: dict[str, Any], factor: float) -> None:
         motion["rate"] *= factor
 
 
-FASTER = {"sine": _faster_sine, "multi_sine": _faster_multi_sine, "pick_and_place": _faster_cycle}
+FASTER = {
+    "sine": _faster_sine, "multi_sine": _faster_multi_sine, "pick_and_place": _faster_cycle,
+    "platform_sine": _faster_sine, "platform_multi_sine": _faster_multi_sine,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Change:
             FASTER[case["motion"]["kind"]](case["motion"], number)
         elif self.parameters:
             new = {name: base * number if self.relative else number for name, base in self.parameters.items()}
-            case["parameters"] = layered(case["parameters"], new)
+            case["parameters"] = {**case["parameters"], **new}
         else:
             node: Any = case
             for part in self.path[:-1]:
@@ -71,9 +73,7 @@ class Change:
             node[self.path[-1]] = node[self.path[-1]] * number if self.relative else number
 
 
-def resolve_key(
-    vary: Vary, case: Mapping[str, Any], table: tuple[ParameterInfo, ...], values: Mapping[str, float]
-) -> Change:
+def resolve_key(vary: Vary, case: Mapping[str, Any], table: ParameterTable, values: Mapping[str, float]) -> Change:
     """Find what a key names.
 
     Parameters
@@ -83,7 +83,7 @@ def resolve_key(
     case
         The case that is varied, as a plain dictionary.
     table, values
-        The mechanism's parameters, and their values before the sweep changes them, by stored name.
+        The robot's parameters, and their values before the sweep changes them, by name.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def resolve_key(
     section, _, name = vary.key.partition(".")
     if section == "parameters" and name:
         try:
-            stored = expand_names(table, {name: 0.0})
+            stored = table.members(name)
         except ParameterError as error:
             raise SpecError(f"{where}: {error}") from error
         return Change(vary.key, vary.relative, {each: values[each] for each in stored})

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from workbench.robots.base import Mechanism
+from workbench.capabilities.robot import Robot
 from workbench.staging import DirectoryKind
 from workbench.workspace.grid import Workspace
 
@@ -19,45 +18,50 @@ FACTS = "workspace.json"
 WORKSPACE = DirectoryKind(
     what="workspace",
     marker=FACTS,
-    keys=frozenset({"format", "mechanism", "volume_m3"}),
+    keys=frozenset({"format", "mechanism", "spacing_m", "shape"}),
     members=(CELLS, FACTS, "figures"),
 )
 
 
-def workspace_facts(workspace: Workspace, mechanism: Mechanism) -> dict[str, Any]:
+def workspace_facts(workspace: Workspace, robot: Robot) -> dict[str, Any]:
     """What ``workspace.json`` holds; lengths in metres, keys documented in docs/workspace.md."""
-    vertical = next(i for i, value in enumerate(mechanism.up) if value)
-    axis = mechanism.platform_axes[vertical]
+    names = [robot.platform_axes[i] for i in workspace.axes]
+    upright = {"xyz"[i]: value for i, value in enumerate(robot.up) if value}
+    coordinate, sign = next(iter(upright.items()))
+    column = robot.coordinates.index(coordinate) if coordinate in robot.coordinates else None
+    axis = robot.platform_axes[column] if column in workspace.axes else None
+    size = {3: ("volume_m3", "volume_error_m3"), 2: ("area_m2", "area_error_m2"), 1: ("length_m", "length_error_m")}
+    amount, error = size[len(workspace.shape)]
     return {
         "format": FORMAT,
-        "mechanism": mechanism.name,
-        "axes": list(mechanism.platform_axes),
-        "up": axis if mechanism.up[vertical] > 0 else None,
-        "down": axis if mechanism.up[vertical] < 0 else None,
+        "mechanism": robot.name,
+        "axes": names,
+        "held": workspace.fixed,
+        "up": axis if sign > 0 else None,
+        "down": axis if sign < 0 else None,
         "spacing_m": workspace.spacing,
         "low_m": workspace.low.tolist(),
         "shape": list(workspace.shape),
         "cells": len(workspace.index),
-        "volume_m3": workspace.volume,
-        "volume_error_m3": workspace.volume_error,
+        amount: workspace.volume,
+        error: workspace.volume_error,
         "border_cells": workspace.border_cells,
-        "joint_limits": dict(zip(mechanism.joints, map(list, workspace.limits), strict=True)),
+        "joint_limits": dict(zip(robot.joints, map(list, workspace.limits), strict=True)),
         "measures": list(workspace.measures),
         "extent_m": {
-            name: [float(workspace.x[:, i].min()), float(workspace.x[:, i].max())]
-            for i, name in enumerate(mechanism.platform_axes)
+            name: [float(workspace.x[:, i].min()), float(workspace.x[:, i].max())] for i, name in enumerate(names)
         },
-        "parameters": dataclasses.asdict(mechanism.parameters),
+        "parameters": dict(robot.values),
     }
 
 
-def write_workspace(stage: Path, workspace: Workspace, mechanism: Mechanism) -> None:
+def write_workspace(stage: Path, workspace: Workspace, robot: Robot) -> None:
     """Write both files into a directory that exists."""
-    columns: dict[str, Any] = {f"i{k + 1}": workspace.index[:, k] for k in range(3)}
-    columns |= {f"x{k + 1}": workspace.x[:, k] for k in range(3)}
-    columns |= {joint: workspace.q[:, k] for k, joint in enumerate(mechanism.joints)}
+    columns: dict[str, Any] = {f"i{k + 1}": workspace.index[:, k] for k in range(len(workspace.shape))}
+    columns |= {f"x{k + 1}": workspace.x[:, k] for k in range(len(workspace.shape))}
+    columns |= {joint: workspace.q[:, k] for k, joint in enumerate(robot.joints)}
     columns |= {f"measure_{name}": values for name, values in workspace.measures.items()}
     columns["condition"] = workspace.condition
     pd.DataFrame(columns).to_parquet(stage / CELLS, index=False)
-    text = json.dumps(workspace_facts(workspace, mechanism), indent=1)
+    text = json.dumps(workspace_facts(workspace, robot), indent=1)
     (stage / FACTS).write_text(text + "\n", encoding="utf-8")

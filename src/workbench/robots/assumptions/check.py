@@ -15,7 +15,7 @@ from workbench.errors import ModelError
 from workbench.robots.assumptions.rules import ALIGNMENT, Assumption, Context
 from workbench.robots.assumptions.structure import STRUCTURAL_CHECKS, principal_axes
 from workbench.robots.parameters import Target
-from workbench.robots.values import target_number, vector
+from workbench.robots.values import vector
 
 if TYPE_CHECKING:
     from workbench.robots.load import LoadedModel
@@ -50,7 +50,7 @@ def _numbers(
     worst, shown = -1.0, ("", "", True, "")
     for index, value in enumerate(found):
         if index in targets:
-            expected = target_number(targets[index], values)
+            expected = targets[index].number(values)
             why = " * ".join([f"{targets[index].factor:g}", *targets[index].of])
         elif attribute in ("pos", "gravity"):
             expected, why = 0.0, "on the axis"
@@ -80,9 +80,10 @@ def check_assumptions(loaded: LoadedModel) -> list[Assumption]:
     list of Assumption
         Empty for a model without a closed form. Where names or the tree are broken, the numbers are not checked.
     """
-    if loaded.kind is None:
+    described = loaded.description
+    if described is None or described.layout is None:
         return []
-    context = Context(loaded.model, loaded.kind, loaded.file, loaded.text)
+    context = Context(loaded.model, described, loaded.file, loaded.text)
     found = list(structural(context))
     if loaded.values is None or any(not a.ok and a.value == "missing" for a in found):
         if loaded.problem:

@@ -13,7 +13,7 @@ from workbench.arrays import FloatArray
 from workbench.errors import did_you_mean
 from workbench.mjcf.text import Element, find_any, scan
 from workbench.robots.assumptions.layout import Layout
-from workbench.robots.base import Mechanism
+from workbench.robots.description import Description
 from workbench.robots.values import missing
 
 ALIGNMENT = 1e-12
@@ -54,7 +54,7 @@ class Context:
     """A compiled model beside the mechanism that it is said to describe."""
 
     model: mujoco.MjModel
-    mechanism: type[Mechanism]
+    mechanism: Description
     file: str
     text: str
     _elements: list[Element] | None = field(default=None, repr=False)
@@ -62,6 +62,7 @@ class Context:
     @property
     def layout(self) -> Layout:
         """The make-up that the closed form assumes."""
+        assert self.mechanism.layout is not None
         return self.mechanism.layout
 
     @cached_property

@@ -14,7 +14,7 @@ from workbench.arrays import FloatArray
 from workbench.errors import ParameterError
 from workbench.robots.asym_2rss_ppap import literal
 from workbench.robots.asym_2rss_ppap.literal import Misprint
-from workbench.robots.base import Candidate, Mechanism
+from workbench.robots.closed_form import Candidate
 from workbench.robots.mass_models import MASS_MODELS, MassModel, mass_model
 
 MISPRINT_NAMES = {
@@ -57,8 +57,9 @@ class Candidates(Mapping[str, Candidate]):
 
 
 def _of_mass_model(model: MassModel) -> Candidate:
-    def torques(mech: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> FloatArray:
-        return mech.torques(q, qd, qdd, model.name, force) + mech.friction(q, qd, qdd)
+    def torques(mech: Any, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> FloatArray:
+        tau: FloatArray = mech.torques(q, qd, qdd, model.name, force) + mech.friction(q, qd, qdd)
+        return tau
 
     return Candidate(
         name=model.name,
@@ -77,9 +78,7 @@ def _literal(
     source: str,
     misprints: frozenset[Misprint] = literal.REPAIRED,
 ) -> Candidate:
-    def torques(
-        mech: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray
-    ) -> FloatArray:
+    def torques(mech: Any, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray) -> FloatArray:
         result: FloatArray = function(
             mech.parameters,
             q,
@@ -89,7 +88,8 @@ def _literal(
             external_force=external_force,
             misprints=misprints,
         )
-        return result + mech.friction(q, qd, qdd)
+        friction: FloatArray = mech.friction(q, qd, qdd)
+        return result + friction
 
     return Candidate(name, mass_model, torques, description, source)
 

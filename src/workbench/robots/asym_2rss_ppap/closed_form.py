@@ -1,13 +1,12 @@
 """The asymmetric 2RSS+PPaP pick-and-place robot of [Almeida2010].
 
 Frame: the paper's, x3 down, gravity (0, 0, +g). Left limb A-C-E is driven by q2, right limb B-D-F by q3, the slider of
-the central limb by q1. The equations stand in `asym_2rss_ppap_kernel`; this module gives them names, units, checks and
+the central limb by q1. The equations stand in `kernel`; this module gives them names, units, checks and
 errors.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,11 +19,11 @@ from workbench.robots.asym_2rss_ppap import kernel
 from workbench.robots.asym_2rss_ppap.candidates import CANDIDATES
 from workbench.robots.asym_2rss_ppap.friction import Friction
 from workbench.robots.asym_2rss_ppap.kernel import SINGULAR
-from workbench.robots.asym_2rss_ppap.parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
-from workbench.robots.base import Mechanism, Reach, refuse_samples
+from workbench.robots.asym_2rss_ppap.layout import LAYOUT
+from workbench.robots.closed_form import ClosedForm, Reach, refuse_samples
 from workbench.robots.kernel_call import TorqueKernel, fill_torques, one_sample
 from workbench.robots.mass_models import mass_model as mass_model_of
-from workbench.robots.parameters import ParameterInfo, Target, UniformRule
+from workbench.robots.registration import closed_form
 from workbench.robots.sine_cosine import LARGEST_ANGLE
 
 ELBOWS = ("out", "in")
@@ -33,30 +32,14 @@ SAME_BRANCH = 1e-7
 """Positions that differ by less than this fraction of the parallelogram's length are the same pose."""
 
 
-class Asym2rssPpap(Mechanism):
+@closed_form
+class Asym2rssPpap(ClosedForm):
     """Closed-form kinematics and inverse dynamics of the 2RSS+PPaP robot."""
 
-    name: ClassVar[str] = "asym_2rss_ppap"
-    title: ClassVar[str] = "Asymmetric 2RSS+PPaP pick-and-place robot"
-    reference_key: ClassVar[str] = "Almeida2010"
-    joints: ClassVar[tuple[str, ...]] = ("q1", "q2", "q3")
-    coordinate_units: ClassVar[tuple[str, ...]] = ("m", "rad", "rad")
-    force_units: ClassVar[tuple[str, ...]] = ("N", "N m", "N m")
-    platform_axes: ClassVar[tuple[str, ...]] = ("x1", "x2", "x3")
-    up: ClassVar[tuple[float, float, float]] = (0.0, 0.0, -1.0)
-    joint_limits: ClassVar[tuple[tuple[float, float], ...]] = (
-        (-0.15, 0.15),
-        (-math.pi / 4, 0.75 * math.pi),
-        (-math.pi / 4, 0.75 * math.pi),
-    )
-    parameter_table: ClassVar[tuple[ParameterInfo, ...]] = PARAMETERS
-    targets: ClassVar[tuple[Target, ...]] = TARGETS
-    uniform_rules: ClassVar[tuple[UniformRule, ...]] = UNIFORM_RULES
     layout: ClassVar[Layout] = LAYOUT
-    parameter_type: ClassVar[type] = Parameters
 
     def __init__(self, parameters: Any) -> None:
-        """Build from `Parameters`; see `Mechanism`."""
+        """Build from the values of the robot's parameters, by name."""
         super().__init__(parameters)
         self._friction = Friction(parameters)
         self._constants = {model: kernel.pack(parameters, mass_model_of(model)) for model in self.mass_models}
@@ -110,7 +93,7 @@ class Asym2rssPpap(Mechanism):
         return q
 
     def reach(self, x: ArrayLike) -> Reach:
-        """Inverse kinematics, elbows out, that marks positions out of reach; see `Mechanism.reach`."""
+        """Inverse kinematics, elbows out, that marks positions out of reach; see `ClosedForm.reach`."""
         points = as_batch("x", x)
         q, problems = self._arm_angles(points, ("out", "out"))
         n = len(points)
@@ -134,8 +117,8 @@ class Asym2rssPpap(Mechanism):
         measures = {name: np.where(reachable, value, np.nan) for name, value in self._scaled(determinants).items()}
         return Reach(q, reachable, measures, condition)
 
-    def reach_box(self) -> tuple[FloatArray, FloatArray]:
-        """Box that holds the workspace; see `Mechanism.reach_box`."""
+    def reach_box(self, limits: tuple[tuple[float, float], ...]) -> tuple[FloatArray, FloatArray]:
+        """Box that holds the workspace; see `ClosedForm.reach_box`."""
         p = self._parameters
         along = min(p.a2_left, p.a2_right)
         across, depth = p.a5, min(p.a1_left + p.a2_left, p.a1_right + p.a2_right)
@@ -233,7 +216,7 @@ class Asym2rssPpap(Mechanism):
         external_force: FloatArray,
         threads: int = 1,
     ) -> FloatArray:
-        """Inverse dynamics on arrays of checked shape; see `Mechanism.torques`.
+        """Inverse dynamics on arrays of checked shape; see `ClosedForm.torques`.
 
         *mass_model* may be any that `workbench.robots.mass_models.mass_model` knows.
         """
@@ -244,7 +227,7 @@ class Asym2rssPpap(Mechanism):
         return tau
 
     def kernel(self, mass_model: str = "distributed") -> TorqueKernel:
-        """Inverse dynamics of one sample at a time, prepared for control loops; see `Mechanism.kernel`."""
+        """Inverse dynamics of one sample at a time, prepared for control loops; see `ClosedForm.kernel`."""
         self._check_mass_model(mass_model)
 
         def refuse(q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> None:
@@ -270,14 +253,14 @@ class Asym2rssPpap(Mechanism):
         return bool(self._friction)
 
     def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-        """What the actuators must supply for friction and rotors; see `Mechanism.friction` and docs/friction.md."""
+        """What the actuators must supply for friction and rotors; see `ClosedForm.friction` and docs/friction.md."""
         if not self._friction:
             return np.zeros_like(q)
         x, xd, _, jacobian, _ = self._motion(q, qd, qdd)
         return self._friction.torques(q, qd, qdd, x, xd, jacobian)
 
     def friction_warnings(self, qd: FloatArray) -> list[str]:
-        """Samples at which a joint with Coulomb friction rests; see `Mechanism.friction_warnings`."""
+        """Samples at which a joint with Coulomb friction rests; see `ClosedForm.friction_warnings`."""
         return self._friction.drives.warnings(qd)
 
     def _motion(

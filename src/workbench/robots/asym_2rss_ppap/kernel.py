@@ -36,7 +36,7 @@ def pack(p: Any, model: MassModel = MASS_MODELS["distributed"]) -> FloatArray:
     Parameters
     ----------
     p
-        Parameters of the mechanism (`workbench.robots.asym_2rss_ppap.closed_form.Parameters`), SI.
+        Parameters of the robot, by name, SI.
     model
         What every bar weighs at its ends.
 

@@ -23,14 +23,11 @@ and the effect of each misprint stand in docs/derivations/asym_2rss_ppap.md.
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from workbench.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from workbench.robots.asym_2rss_ppap.parameters import Parameters
 
 
 class Misprint(Enum):
@@ -61,7 +58,7 @@ DISTRIBUTED_AS_PRINTED = APPENDIX_AS_PRINTED | {Misprint.BD_ROTATION_Q2}
 
 
 def lumped_appendix(
-    p: Parameters,
+    p: Any,
     q: FloatArray,
     qd: FloatArray,
     qdd: FloatArray,
@@ -154,7 +151,7 @@ def lumped_appendix(
 
 
 def lumped_equation4(
-    p: Parameters,
+    p: Any,
     q: FloatArray,
     qd: FloatArray,
     qdd: FloatArray,
@@ -218,7 +215,7 @@ def lumped_equation4(
 
 
 def distributed_rotation(
-    p: Parameters,
+    p: Any,
     q: FloatArray,
     qd: FloatArray,
     qdd: FloatArray,
@@ -251,7 +248,7 @@ def distributed_rotation(
 
 
 def _torque_ce(
-    p: Parameters,
+    p: Any,
     q: FloatArray,
     qd: FloatArray,
     qdd: FloatArray,
@@ -285,7 +282,7 @@ def _torque_ce(
 
 
 def _torque_df(
-    p: Parameters,
+    p: Any,
     q: FloatArray,
     qd: FloatArray,
     qdd: FloatArray,
@@ -329,7 +326,7 @@ def _rotation_torque(
     return _work(torque, turn_of_q)
 
 
-def _jxq(p: Parameters, q: FloatArray, x: FloatArray, misprints: frozenset[Misprint]) -> FloatArray:
+def _jxq(p: Any, q: FloatArray, x: FloatArray, misprints: frozenset[Misprint]) -> FloatArray:
     """J_xq = J_x^-1 J_q of eq. (2), shape ``(n, 3, 3)``."""
     zero, one = np.zeros(len(q)), np.ones(len(q))
     x1, x2, x3 = x.T

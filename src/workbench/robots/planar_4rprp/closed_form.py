@@ -2,7 +2,7 @@
 
 Frame: the paper's, y up, gravity (0, -g, 0). Limbs 1 and 3 turn about axes parallel to x and carry the ends of rod 1-3,
 limbs 2 and 4 turn about axes parallel to z and carry rod 2-4; both rods slide in the platform. The equations stand in
-`planar_4rprp_kernel`; this module gives them names, units, checks and errors.
+`kernel`; this module gives them names, units, checks and errors.
 """
 
 from __future__ import annotations
@@ -14,40 +14,30 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch, as_batches
 from workbench.robots.assumptions.layout import Layout
-from workbench.robots.base import Candidate, Condition, Mechanism, Reach, refuse_samples
+from workbench.robots.closed_form import Candidate, ClosedForm, Condition, Reach, refuse_samples
 from workbench.robots.kernel_call import TorqueKernel, fill_torques, one_sample
-from workbench.robots.parameters import ParameterInfo, Target, UniformRule
 from workbench.robots.planar_4rprp import kernel
 from workbench.robots.planar_4rprp import screws as screw_route
 from workbench.robots.planar_4rprp.friction import Friction
 from workbench.robots.planar_4rprp.kernel import SINGULAR
-from workbench.robots.planar_4rprp.parameters import LAYOUT, PARAMETERS, TARGETS, UNIFORM_RULES, Parameters
+from workbench.robots.planar_4rprp.layout import LAYOUT
+from workbench.robots.registration import closed_form
+
+JOINTS = ("q1", "q2", "q3")
 
 BAR_INERTIA = {"distributed": 1.0, "lumped": 0.0}
 HOME_SOLUTION = 2
 """Index of the home branch (Px > 0, Py > 0) in `Planar4Rprp.forward_kinematics_all`: Table 2's third solution."""
 
 
-class Planar4Rprp(Mechanism):
+@closed_form
+class Planar4Rprp(ClosedForm):
     """Closed-form kinematics and inverse dynamics of the 4-RPRP robot."""
 
-    name: ClassVar[str] = "planar_4rprp"
-    title: ClassVar[str] = "Translational 4-RPRP robot based on planar mechanisms"
-    reference_key: ClassVar[str] = "GarciaMurillo2016"
-    joints: ClassVar[tuple[str, ...]] = ("q1", "q2", "q3")
-    coordinate_units: ClassVar[tuple[str, ...]] = ("m", "m", "m")
-    force_units: ClassVar[tuple[str, ...]] = ("N", "N", "N")
-    platform_axes: ClassVar[tuple[str, ...]] = ("x", "y", "z")
-    up: ClassVar[tuple[float, float, float]] = (0.0, 1.0, 0.0)
-    joint_limits: ClassVar[tuple[tuple[float, float], ...]] = ((0.2, 0.6), (0.2, 0.6), (0.2, 0.6))
-    parameter_table: ClassVar[tuple[ParameterInfo, ...]] = PARAMETERS
-    targets: ClassVar[tuple[Target, ...]] = TARGETS
-    uniform_rules: ClassVar[tuple[UniformRule, ...]] = UNIFORM_RULES
     layout: ClassVar[Layout] = LAYOUT
-    parameter_type: ClassVar[type] = Parameters
 
     def __init__(self, parameters: Any) -> None:
-        """Build from `Parameters`; see `Mechanism`."""
+        """Build from the values of the robot's parameters, by name."""
         super().__init__(parameters)
         self._friction = Friction(parameters)
         self._constants = {model: kernel.pack(parameters, factor) for model, factor in BAR_INERTIA.items()}
@@ -116,7 +106,7 @@ class Planar4Rprp(Mechanism):
         return np.stack([np.hypot(py, pz), np.hypot(px, py - p.h), np.hypot(py, p.b - pz)], axis=1)
 
     def reach(self, x: ArrayLike) -> Reach:
-        """Inverse kinematics on the home branch that marks positions out of reach; see `Mechanism.reach`."""
+        """Inverse kinematics on the home branch that marks positions out of reach; see `ClosedForm.reach`."""
         points = as_batch("x", x)
         p = self._parameters
         px, py, pz = points.T
@@ -129,9 +119,9 @@ class Planar4Rprp(Mechanism):
         measures = {name: np.where(reachable, value, np.nan) for name, value in self._measures(q, points).items()}
         return Reach(q, reachable, measures, condition)
 
-    def reach_box(self) -> tuple[FloatArray, FloatArray]:
-        """Box that holds every position with limbs no longer than `joint_limits` allow; see `Mechanism.reach_box`."""
-        longest = max(high for _, high in self.joint_limits)
+    def reach_box(self, limits: tuple[tuple[float, float], ...]) -> tuple[FloatArray, FloatArray]:
+        """Box that holds every position with limbs no longer than *limits* allow; see `ClosedForm.reach_box`."""
+        longest = max(high for _, high in limits)
         p = self._parameters
         return np.array([0.0, 0.0, p.b - longest]), np.array([longest, longest, longest])
 
@@ -216,7 +206,7 @@ class Planar4Rprp(Mechanism):
         count = gogu_mobility(self._parameters)
         return {"joints p": count.p, "lost joint parameters r": count.r, "mobility M = p - r": count.mobility}
 
-    def paper_conditions(self, q: ArrayLike) -> tuple[Condition, ...]:
+    def conditions(self, q: ArrayLike) -> tuple[Condition, ...]:
         """Section 5's conditions on the limb lengths and Figure 7's, which are neither necessary nor sufficient."""
         from workbench.robots.planar_4rprp.singularity import paper_singularity_conditions
 
@@ -250,7 +240,7 @@ class Planar4Rprp(Mechanism):
         external_force: FloatArray,
         threads: int = 1,
     ) -> FloatArray:
-        """Inverse dynamics on arrays of checked shape; see `Mechanism.torques`."""
+        """Inverse dynamics on arrays of checked shape; see `ClosedForm.torques`."""
         constants = self._constants[mass_model]
         tau = np.empty_like(q)
         if fill_torques(kernel.torques_batch, constants, q, qd, qdd, external_force, tau, threads):
@@ -258,7 +248,7 @@ class Planar4Rprp(Mechanism):
         return tau
 
     def kernel(self, mass_model: str = "distributed") -> TorqueKernel:
-        """Inverse dynamics of one sample at a time, prepared for control loops; see `Mechanism.kernel`."""
+        """Inverse dynamics of one sample at a time, prepared for control loops; see `ClosedForm.kernel`."""
         self._check_mass_model(mass_model)
 
         def refuse(q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> None:
@@ -279,14 +269,14 @@ class Planar4Rprp(Mechanism):
         return bool(self._friction)
 
     def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-        """What the actuators must supply for friction and rotors; see `Mechanism.friction` and docs/friction.md."""
+        """What the actuators must supply for friction and rotors; see `ClosedForm.friction` and docs/friction.md."""
         if not self._friction:
             return np.zeros_like(q)
         x, xd, _ = self.platform_motion(q, qd, qdd)
         return self._friction.torques(qd, qdd, x, xd, self.jacobian(q))
 
     def friction_warnings(self, qd: FloatArray) -> list[str]:
-        """Samples at which a joint with Coulomb friction rests; see `Mechanism.friction_warnings`."""
+        """Samples at which a joint with Coulomb friction rests; see `ClosedForm.friction_warnings`."""
         return self._friction.drives.warnings(qd)
 
     def _solve(self, q: FloatArray) -> FloatArray:
@@ -318,7 +308,7 @@ class Planar4Rprp(Mechanism):
         return {"det J_r": determinant, "q4 / a": self._passive_length(x) / self._parameters.a}
 
     def _refuse_lengths(self, q: FloatArray) -> None:
-        for column, joint in enumerate(self.joints):
+        for column, joint in enumerate(JOINTS):
             refuse_samples(q[:, column] <= 0, joint, "limb length must be > 0", q, "q")
 
     def _refuse_unreachable(self, q: FloatArray, x: FloatArray) -> None:
@@ -350,12 +340,11 @@ def _kernel_candidate(mass_model: str) -> Candidate:
 
 
 def _screw_candidate(name: str, description: str, moment_sign: float) -> Candidate:
-    def torques(
-        mech: Mechanism, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray
-    ) -> FloatArray:
+    def torques(mech: Any, q: FloatArray, qd: FloatArray, qdd: FloatArray, external_force: FloatArray) -> FloatArray:
         x = mech.forward_kinematics(q)
         tau = screw_route.torques(mech.parameters, q, qd, qdd, x, external_force, moment_sign=moment_sign)
-        return tau + mech.friction(q, qd, qdd)
+        friction: FloatArray = mech.friction(q, qd, qdd)
+        return tau + friction
 
     return Candidate(name, "distributed", torques, description, "[GarciaMurillo2016] eq. (17)-(32)")
 

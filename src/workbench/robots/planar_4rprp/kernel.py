@@ -28,7 +28,7 @@ def pack(p: Any, bar_inertia: float = 1.0) -> FloatArray:
     Parameters
     ----------
     p
-        Parameters of the mechanism (`workbench.robots.planar_4rprp.closed_form.Parameters`), SI.
+        Parameters of the robot, by name, SI.
     bar_inertia
         Factor on the rotational inertia of cylinders and pistons: 1 for distributed masses, 0 for lumped ones.
     """

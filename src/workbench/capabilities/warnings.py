@@ -1,0 +1,93 @@
+"""What a reader of a robot's results should know: one line each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from workbench.arrays import FloatArray
+from workbench.errors import MotionError
+from workbench.reference.structure import SPIN
+from workbench.robots.friction import DriveFriction
+from workbench.robots.parameters import ParameterTable
+
+if TYPE_CHECKING:
+    from workbench.capabilities.robot import Robot
+
+NEAR_SINGULAR = 0.05
+"""A pose is worth a warning when a scaled determinant is below this: a factor of twenty between forces and torques."""
+
+LONGEST_LINK = 20.0
+"""Metres; no parallel robot has a longer link, so a longer one was written in millimetres."""
+
+DEGREES = 4.0 * np.pi
+"""A hinge that moves through more than two turns was most likely given in degrees."""
+
+
+def near_singular_warnings(robot: Robot, t: FloatArray, q: FloatArray) -> list[str]:
+    """Poses of a motion that come close to a singular one."""
+    found = []
+    for name, values in robot.singularity_measures(q).items():
+        worst = int(np.argmin(np.abs(values)))
+        if abs(values[worst]) < NEAR_SINGULAR:
+            found.append(
+                f"close to a singular pose at t = {t[worst]:.6g} s: |{name}| falls to {abs(values[worst]):.3g} of"
+                f" its scale (warning below {NEAR_SINGULAR:g})"
+            )
+    return found
+
+
+def millimetre_warnings(table: ParameterTable, values: Mapping[str, float]) -> list[str]:
+    """Lengths that were most likely written in millimetres."""
+    return [
+        f"{name} = {values[name]:g} m is longer than {LONGEST_LINK:g} m: lengths are in metres, this looks like"
+        " millimetres"
+        for name, info in table.infos.items()
+        if info.unit == "m" and abs(values[name]) > LONGEST_LINK
+    ]
+
+
+def reference_warnings(robot: Robot, qd: FloatArray | None) -> list[str]:
+    """What the reference takes for granted where no closed form says it: excess actuators, idle spins, rest."""
+    reference, found = robot.reference, []
+    structure, model = reference.structure, reference.compiled()
+    if qd is not None and not reference.excess_actuators:
+        dry = np.asarray(model.dof_frictionloss)[structure.actuated]
+        found += DriveFriction(robot.joints, 0.0 * dry, dry, 0.0 * dry).warnings(qd)
+    if reference.excess_actuators:
+        freedoms = len(robot.joints) - reference.excess_actuators
+        found.append(
+            f"redundant actuation: {len(robot.joints)} actuators for {freedoms} freedom(s); the reference's torques"
+            " are those of least norm, newtons and newton-metres counted alike; no second engine looks at"
+            " them, and reactions are left out"
+        )
+    spinning = structure.blocks[structure.blocks[:, 0] == SPIN, 1]
+    for name, body in zip(structure.idle, spinning, strict=True):
+        dofs = slice(model.body_dofadr[body], model.body_dofadr[body] + 3)
+        if model.dof_damping[dofs].any() or model.dof_armature[dofs].any():
+            found.append(
+                f"rod {name}: damping or armature of its ball joint would spin it about its own axis; the reference"
+                " holds that spin at zero, by a moment that no actuator gives"
+            )
+    return found
+
+
+def refuse_degrees(robot: Robot, q: FloatArray) -> None:
+    """Refuse hinge coordinates ``(n, na)`` that look like degrees.
+
+    Raises
+    ------
+    MotionError
+        Naming the joint and its largest value.
+    """
+    for i, (joint, unit) in enumerate(zip(robot.joints, robot.coordinate_units, strict=True)):
+        far = float(np.abs(q[:, i]).max(initial=0.0))
+        if unit == "rad" and far > DEGREES and np.ptp(q[:, i]) < far:
+            raise MotionError(
+                f"joint {joint}: reaches {far:g} rad, {far / (2 * np.pi):.3g} turns, and never passes zero; angles"
+                f" are in radians ({far:g} degrees are {np.radians(far):.6g} rad)",
+                joint=joint,
+                value=far,
+            )
