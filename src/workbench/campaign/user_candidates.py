@@ -145,6 +145,8 @@ def _valid_names(error: BaseException, parameters: Any) -> str:
     """Return the names that the parameters have, where a formula has asked for another one."""
     if not isinstance(error, AttributeError) or error.obj is not parameters or not is_dataclass(parameters):
         return ""
+    if "did you mean" in said(error) or "valid:" in said(error):
+        return ""  # they have said it themselves
     names = {part for one in fields(parameters) for part in (one.name, re.sub("_(left|right)$", "", one.name))}
     return did_you_mean(error.name or "", names)
 
