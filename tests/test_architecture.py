@@ -19,7 +19,7 @@ PACKAGE = "workbench"
 MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("cli", "commands", "console"),
+    ("__main__", "cli", "commands", "console"),
     ("report", "compare", "rendering"),
     ("sweep", "diagnosis"),
     ("campaign", "workspace"),
@@ -40,6 +40,13 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "errors",
         "data_files",
         "limits",
+        "processes",
+        "reading",
+        "records",
+        "file_lock",
+        "scratch",
+        "shielded",
+        "plotting",
         "schema",
         "documents",
         "_version",

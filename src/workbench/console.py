@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -34,6 +35,9 @@ from workbench.campaign.verdict import (
 
 WIDE = 110
 """Columns of a table where there is no terminal to ask, in a log for instance."""
+
+LINE_EVERY_S = 10.0
+"""Seconds between lines of progress where there is no terminal."""
 
 SEEN_AS_PERCENT = 1e-6
 """Smaller errors show as powers of ten also among percentages."""
@@ -83,6 +87,43 @@ class CaseProgress:
             self._bar.update(self._task, description=label, completed=number, total=total)
         elif case:
             err.print(f"[{number + 1}/{total}] {case}", markup=False)
+
+
+class Steps:
+    """Steps of something that may take a while: a bar on a terminal, a line now and then elsewhere.
+
+    *what* is said beside it: ``drawing figures``.
+    """
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._said = time.monotonic()
+        self._bar = Progress(
+            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+            console=err, transient=True, disable=not err.is_terminal,
+        )  # fmt: skip
+        self._task: Any = None
+
+    def __enter__(self) -> Self:
+        """Start the bar."""
+        self._bar.start()
+        self._task = self._bar.add_task(self._what, total=None)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Take the bar away."""
+        self._bar.stop()
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show that so many steps are done."""
+        now = time.monotonic()
+        if err.is_terminal:
+            self._bar.update(self._task, completed=done, total=total)
+        elif now - self._said > LINE_EVERY_S:
+            self._said = now
+            err.print(f"[{done}/{total}] {self._what}", markup=False)
 
 
 def print_outcome(outcome: Outcome) -> None:

@@ -22,7 +22,7 @@ from workbench.campaign.manifest import describe
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.campaign.user_candidates import UserCandidate, load_candidates, with_rows
 from workbench.campaign.verdict import FAIL, VERIFICATION
-from workbench.errors import SpecError, WorkbenchError
+from workbench.errors import OutputError, SpecError, WorkbenchError
 from workbench.staging import check_output, staged
 
 
@@ -62,9 +62,9 @@ Pick = Callable[[Campaign, Path, Path | None, Mapping[str, float], Sequence[str]
 
 def run_campaign(
     path: str | Path,
-    out: Path | None = None,
+    out: str | Path | None = None,
     *,
-    model: Path | None = None,
+    model: str | Path | None = None,
     only: Sequence[str] = (),
     settings: Mapping[str, float] | None = None,
     relative: Sequence[str] = (),
@@ -117,7 +117,12 @@ def run_campaign(
     """
     started, clock = datetime.now(UTC), time.perf_counter()
     campaign, file = load_campaign(path)
-    directory = out or Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
+    model = None if model is None else Path(model)
+    directory = (
+        Path(out)
+        if out is not None
+        else Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
+    )
     users = load_candidates(candidates)
     campaign = with_rows(campaign, users)
     if campaign.sweep:
@@ -128,7 +133,11 @@ def run_campaign(
     check_engines(effort.engines)
     cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users)
     results: list[CaseResult] = []
-    with locked(directory), staged(directory) as stage, closing(pictures) if pictures else nullcontext():
+    with (
+        locked(directory),
+        staged(directory, alone=True) as stage,
+        closing(pictures) if pictures else nullcontext(),
+    ):
         for number, case in enumerate(cases):
             if progress:
                 progress(case.name, number, len(cases))
@@ -156,8 +165,14 @@ def run_campaign(
         store.write_manifest(stage, manifest)
         if pictures:
             pictures.finish(stage)
-        if report:
-            report(stage)
+        failure = _report(report, stage) if report else None
+    if failure is not None:
+        said = f"{failure}" if isinstance(failure, WorkbenchError) else f"{type(failure).__name__}: {failure}"
+        raise OutputError(
+            f"{directory}: the results stand there, its report could not be written:"
+            f" {said.replace(str(stage), str(directory))}; workbench report {directory} tries again",
+            path=str(directory),
+        ) from failure
     return Outcome(directory, passed, rows, manifest)
 
 
@@ -177,6 +192,15 @@ def _explained(
         command = shlex.join(["workbench", "diagnose", str(path), *options, "--candidate", candidate])
         found[candidate] = {"reference": reference, "findings": sentences, "command": command}
     return found
+
+
+def _report(report: Callable[[Path], object], stage: Path) -> Exception | None:
+    """Write the report; what is wrong with it must not cost the results, which may have taken hours."""
+    try:
+        report(stage)
+    except Exception as error:
+        return error
+    return None
 
 
 def compute_named_case(campaign: Campaign, case: Case, file: Path, effort: Effort) -> CaseResult:

@@ -81,7 +81,7 @@ class CaseSubject:
     @property
     def takes_force(self) -> bool:
         """Whether the formula is told the external force; closed forms of the package's own always are."""
-        return not isinstance(self._function, UserCandidate) or self._function._with_force
+        return not isinstance(self._function, UserCandidate) or self._function.takes_force
 
     @property
     def source(self) -> Source | None:

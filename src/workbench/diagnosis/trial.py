@@ -6,13 +6,16 @@ import dataclasses
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.campaign.user_candidates import TooSlow, limit
+from workbench.campaign.bounded_call import UnrulyError, bounded
+from workbench.campaign.formula_files import Siblings
 from workbench.robots.registration import MARK
 
 ONE_EDIT_S = 2.0
@@ -90,6 +93,12 @@ def _named_values(values: Any) -> Any:
     return dataclasses.make_dataclass("Parameters", [(name, float) for name in values], frozen=True)(**values)
 
 
+@cache
+def siblings_of(path: str) -> Siblings:
+    """Modules beside a file, which an edited copy of it imports as well; they stay as they were first read."""
+    return Siblings(Path(path).parent)
+
+
 def load_text(text: str, path: str, candidate: str) -> Callable[..., Any]:
     """Run a source text and return the function that it registers under a name.
 
@@ -101,7 +110,8 @@ def load_text(text: str, path: str, candidate: str) -> Callable[..., Any]:
     module = ModuleType(MODULE)
     module.__file__ = path
     sys.modules[MODULE] = module
-    exec(compile(text, path, "exec"), module.__dict__)  # the user named this file on the command line
+    with siblings_of(path).visible():
+        exec(compile(text, path, "exec"), module.__dict__)  # the user named this file on the command line
     for value in vars(module).values():
         if callable(value) and getattr(getattr(value, MARK, None), "name", None) == candidate:
             function: Callable[..., Any] = value
@@ -113,10 +123,14 @@ def torques_of(paper: Paper, function: Callable[..., Any], exam: Exam) -> FloatA
     """Parts ``(parts, poses, na)`` of an edited formula in one exam; NaN where it fails."""
     q, qd, qdd, force = (array.copy() for array in exam.states)
     given = (q, qd, qdd, force) if paper.with_force else (q, qd, qdd)
+
+    def call() -> FloatArray:
+        with np.errstate(all="ignore"), siblings_of(paper.path).visible():
+            return np.asarray(function(exam.values, *given), dtype=np.float64)
+
     try:
-        with np.errstate(all="ignore"), limit(ONE_EDIT_S):
-            tau = np.asarray(function(exam.values, *given), dtype=np.float64)
-    except (Exception, SystemExit, TooSlow):
+        tau = bounded(call, ONE_EDIT_S)
+    except UnrulyError:
         return np.full_like(exam.parts, np.nan)
     if tau.shape != q.shape:
         return np.full_like(exam.parts, np.nan)
@@ -127,9 +141,8 @@ def torques_of(paper: Paper, function: Callable[..., Any], exam: Exam) -> FloatA
 def score(paper: Paper, text: str, exams: int | None = None) -> Score | None:
     """Score a source text on the first few exams, None for all; None where it does not run."""
     try:
-        with limit(ONE_EDIT_S):
-            function = load_text(text, paper.path, paper.candidate)
-    except (Exception, SystemExit, TooSlow):
+        function = bounded(lambda: load_text(text, paper.path, paper.candidate), ONE_EDIT_S)
+    except UnrulyError:
         return None
     right, total, complete = 0, 0.0, True
     base = moved = np.zeros(0, dtype=np.bool_)
