@@ -16,7 +16,7 @@ from workbench.diagnosis.parts import INERTIA, VELOCITY, WEIGHT, Part, take_apar
 from workbench.diagnosis.probes import choose_poses, make_plan
 from workbench.diagnosis.result import Diagnosis
 from workbench.diagnosis.search import lines_run, make_paper, search_mends, splitting_of
-from workbench.diagnosis.surface import subjects
+from workbench.diagnosis.surface import subjects, write_mended
 from workbench.diagnosis.trial import Setup
 
 EXAMPLES = ("delta", "fourbar", "fivebar", "bricard", "orthoglide")
@@ -284,3 +284,32 @@ def test_terms_add_up_to_the_torque(repository: Path) -> None:
 def test_entries_know_their_digits() -> None:
     assert Entry(Part(WEIGHT), 0, WRONG_MARK, 1e-3, 1.0, None).digits == 3
     assert floors_of({Part(WEIGHT): np.array([[1.0, -2.0]])}).tolist() == [1.0, 2.0]
+
+
+def test_apply_writes_a_copy_that_is_right_and_never_the_file_itself(
+    repository: Path, tmp_path: Path, workbench: Workbench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    campaign, path = spoiled(repository, tmp_path, "fourbar", "+ 1j * p.g)", "- 1j * p.g)")
+    wrong, copy = path.read_text(encoding="utf-8"), tmp_path / "mended.py"
+    found: list[Diagnosis] = []
+
+    def kept(diagnosis: Diagnosis, to: Path) -> None:
+        found.append(diagnosis)
+        write_mended(diagnosis, to)
+
+    monkeypatch.setattr("workbench.diagnosis.surface.write_mended", kept)
+    done = workbench("diagnose", campaign, "--candidates", path, "--jobs", "1", "--apply", copy)
+    assert done.code == 1  # the formula that was asked about is as wrong as before
+    assert "mended copy" in done.out
+    assert path.read_text(encoding="utf-8") == wrong
+    right = (repository / "examples" / "fourbar" / "fourbar.py").read_text(encoding="utf-8")
+    assert copy.read_text(encoding="utf-8") == right
+    (diagnosis,) = found
+    with pytest.raises(wb.WorkbenchError, match="own file"):
+        write_mended(diagnosis, path)
+    assert path.read_text(encoding="utf-8") == wrong
+    # of a right formula there is nothing to apply
+    other = tmp_path / "other.py"
+    done = workbench("diagnose", campaign, "--candidates", copy, "--apply", other)
+    assert done.code == 2
+    assert not other.exists()
