@@ -19,9 +19,9 @@ PACKAGE = "workbench"
 MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("cli", "commands", "console"),
+    ("__main__", "cli", "commands", "console"),
     ("report", "compare", "rendering"),
-    ("sweep", "importing"),
+    ("sweep", "diagnosis", "importing"),
     ("campaign", "workspace"),
     ("capabilities",),
     ("reference",),
@@ -40,6 +40,13 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "errors",
         "data_files",
         "limits",
+        "processes",
+        "reading",
+        "records",
+        "file_lock",
+        "scratch",
+        "shielded",
+        "plotting",
         "schema",
         "documents",
         "_version",

@@ -15,7 +15,7 @@ import pytest
 import workbench as wb
 from own_mechanisms import CAMPAIGN, FOURBAR
 from small_campaign import SMALL, Done, Workbench
-from workbench.campaign import user_candidates
+from workbench.campaign import formula_files, user_candidates
 from workbench.errors import OutputError, SpecError
 from workbench.report.evidence import evidence_table
 
@@ -250,9 +250,7 @@ def test_entry_points_are_known_by_name(monkeypatch: pytest.MonkeyPatch) -> None
         def load() -> object:
             raise RuntimeError("of theirs")
 
-    monkeypatch.setattr(
-        user_candidates, "entry_points", lambda group: [Entry] if group == user_candidates.GROUP else []
-    )
+    monkeypatch.setattr(formula_files, "entry_points", lambda group: [Entry] if group == formula_files.GROUP else [])
     with pytest.raises(SpecError, match="their-model: RuntimeError: of theirs"):
         user_candidates.load_candidates(["their-model"])
     with pytest.raises(SpecError, match='did you mean "their-model"'):

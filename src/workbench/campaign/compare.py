@@ -15,6 +15,7 @@ from workbench.campaign.cases import Case, at_time
 from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
 from workbench.campaign.platform import Platform, platform_of
 from workbench.campaign.spec import Campaign
+from workbench.campaign.spent import spent_on
 from workbench.campaign.torques import Fault, torques_of
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdict_of
@@ -140,6 +141,10 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for point, place in drawing.points.items():
             series |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
+        columns, spent = spent_on(case, reference, next(iter(results)))
+        series |= columns
+        if spent:
+            facts["spent"] = spent
     poses, drawn = (first.qpos, reference.compiled()) if effort.drawing else (None, None)
     faults = tuple(computed.faults.values())
     return CaseResult(case.name, rows, series, computed.noted(facts), faults, drawn, poses)

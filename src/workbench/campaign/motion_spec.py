@@ -12,7 +12,10 @@ MAX_SAMPLES = 100_000
 """Samples of one case: the reference holds some 20 kB of matrices for each while it computes."""
 
 Samples = Annotated[int, Field(le=MAX_SAMPLES)]
-Terms = list[list[Annotated[list[Finite], Field(min_length=2, max_length=3)]]]
+Term = Annotated[list[Finite], Field(min_length=2, max_length=3)]
+Terms = list[Annotated[list[Term], Field(max_length=1000)]]
+Moment = Annotated[Finite, Field(ge=-1e6, le=1e6)]
+"""Seconds; beyond some weeks the phase of a sinusoid is no longer known to all digits."""
 Task = Annotated[list[Finite], Field(min_length=1, max_length=6)]
 """One number for each task coordinate of the robot; how many those are is known where the robot is."""
 
@@ -20,8 +23,8 @@ Task = Annotated[list[Finite], Field(min_length=1, max_length=6)]
 class Window(Strict):
     """When a motion is sampled: seconds, and either a number of samples or a rate in hertz."""
 
-    start: Finite = 0.0
-    stop: Finite
+    start: Moment = 0.0
+    stop: Moment
     samples: Samples | None = None
     rate: Finite | None = None
 

@@ -9,19 +9,26 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
 from workbench.campaign.motion_spec import MOTIONS, Motion
 from workbench.campaign.robot_spec import RobotKeys
 from workbench.campaign.sweep_spec import Filter, SweepSpec, Vary
-from workbench.data_files import bundled
+from workbench.data_files import bundled, bundled_names
 from workbench.documents import Form, read_toml, shorten
 from workbench.errors import SpecError, WorkbenchError, did_you_mean
 from workbench.schema import Finite, Name, Strict, Triple
 
 FORMAT = 1
+
+
+def no_boolean(value: object) -> object:
+    """Refuse true where 1 is meant: Python takes the one for the other."""
+    if isinstance(value, bool):
+        raise ValueError("should be a number")
+    return value
 
 
 class ReplayWindow(Strict):
@@ -86,7 +93,7 @@ class ClaimSpec(Strict):
 class Campaign(RobotKeys):
     """A whole campaign file."""
 
-    format: Literal[1] = 1
+    format: Annotated[Literal[1], BeforeValidator(no_boolean)] = 1
     name: Name
     title: str
     description: str = ""
@@ -134,6 +141,11 @@ def load_campaign(path: str | Path) -> tuple[Campaign, Path]:
     return campaign, found
 
 
+def campaign_names() -> tuple[str, ...]:
+    """Names of the campaigns that come with the package."""
+    return tuple(name.removesuffix(".toml") for name in bundled_names("campaigns"))
+
+
 def _find(path: Path) -> Path:
     try:
         if path.is_file():
@@ -147,7 +159,8 @@ def _find(path: Path) -> Path:
             return bundled("campaigns", path.name)
         except WorkbenchError:
             pass
-    raise SpecError(f"{path}: no such campaign file", file=str(path))
+    named = f"; those that come along: {', '.join(campaign_names())}" if len(path.parts) <= 1 else ""
+    raise SpecError(f"{path}: no such campaign file{named}", file=str(path))
 
 
 FORM = Form(

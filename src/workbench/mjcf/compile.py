@@ -13,8 +13,6 @@ import numpy as np
 from workbench.data_files import bundled
 from workbench.errors import ModelError, WorkbenchError
 from workbench.limits import LARGEST_NUMBER
-from workbench.mjcf.assets import parse
-from workbench.mjcf.source import read_source
 
 FINITE = (
     "qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
@@ -66,32 +64,13 @@ def engine_warnings() -> Iterator[list[str]]:
         mujoco.set_mju_user_warning(before)
 
 
-def compile_text(text: str, file: str, folder: Path | None = None) -> mujoco.MjModel:
-    """Compile an MJCF text.
-
-    Parameters
-    ----------
-    text, file
-        The MJCF and the name under which errors speak of it.
-    folder
-        The model's directory, from which it may read other files; None: it reads none.
-
-    Raises
-    ------
-    ModelError
-        MuJoCo's own message, which names the file's line; or a number that is not finite or beyond `LARGEST_NUMBER`.
-    """
-    source = read_source(text, file, folder)
-    return compile_spec(parse(source), file)
-
-
 def compile_spec(spec: mujoco.MjSpec, file: str) -> mujoco.MjModel:
     """Compile a specification.
 
     Raises
     ------
     ModelError
-        As `compile_text`.
+        MuJoCo's own message, which names the file's line; or a number that is not finite or beyond `LARGEST_NUMBER`.
     """
     try:
         with engine_warnings():

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from pathlib import Path
 
 import mujoco
@@ -40,7 +41,14 @@ def _smaller(picture: np.ndarray) -> Image.Image:
     return Image.fromarray(picture).reduce(FINER)
 
 
+def _end_with_parent() -> None:
+    """Wait for the end of the standard input, which the run that began this process holds open, and end."""
+    sys.stdin.buffer.read()
+    os._exit(0)
+
+
 if __name__ == "__main__":
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     if hasattr(os, "nice"):
         os.nice(10)  # the run that it belongs to goes first
     film(Path(sys.argv[1]), *map(int, sys.argv[2:5]))

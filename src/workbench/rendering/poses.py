@@ -75,7 +75,7 @@ def motion_poses(
         As for a run; or times that the motion does not have, or too many frames.
     """
     spec, file = load_campaign(campaign)
-    found = resolve_cases(spec, file, path, (case or spec.case[0].name,))[0]
+    found = resolve_cases(spec, file, path, (spec.case[0].name if case is None else case,))[0]
     first, last = float(found.motion.t[0]), float(found.motion.t[-1])
     start, stop = first if start is None else start, last if stop is None else stop
     if not first <= start <= stop <= last:

@@ -166,6 +166,21 @@ def _refuse_target(target: Path) -> None:
         raise OutputError(f"{target}: is a symbolic link; name the file that it leads to")
     if not stat.S_ISREG(mode):
         raise OutputError(f"{target}: is {'a directory' if stat.S_ISDIR(mode) else 'no regular file'}; name a file")
+    _refuse_protected(target)
+
+
+def _refuse_protected(target: Path) -> None:
+    """Refuse a file that its owner has protected, or that has a second name which would keep the old content."""
+    try:
+        status = os.lstat(target)
+    except OSError:
+        return
+    if not status.st_mode & stat.S_IWUSR or not os.access(target, os.W_OK):
+        raise OutputError(f"{target}: is read-only; make it writable or name another file")
+    if status.st_nlink > 1:
+        raise OutputError(
+            f"{target}: has {status.st_nlink} names (hard links), of which one would change; name another file"
+        )
 
 
 def _write(target: Path, text: str, source: Path) -> None:

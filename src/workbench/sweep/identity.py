@@ -83,7 +83,9 @@ def common_key(
             "filter": filters,
             "keep_series": keep_series,
             "keys": campaign.model_dump(include=set(RobotKeys.model_fields) - {"model", "robot"}),
-            "users": {user.name: provenance.sha256(user.file.read_bytes()) for user in users},
+            "users": {
+                user.name: provenance.sha256(b"".join(file.read_bytes() for file in user.files)) for user in users
+            },
         }
     )
 
