@@ -48,12 +48,12 @@ class NullSpaceOracle:
 
     def __init__(
         self,
-        text: str,
+        text: str | mujoco.MjSpec,
         actuated: list[str],
         spins: list[tuple[str, tuple[str, list[float]], tuple[str, list[float]]]] | None = None,
         spoil: str = "",
     ) -> None:
-        spec = mujoco.MjSpec.from_string(text)
+        spec = mujoco.MjSpec.from_string(text) if isinstance(text, str) else text
         flags = mujoco.mjtDisableBit
         spec.option.disableflags |= flags.mjDSBL_CONTACT.value | flags.mjDSBL_LIMIT.value
         spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE

@@ -250,8 +250,8 @@ BAD_MODELS = {
     "two of a name": ('<joint name="q2"', '<joint name="q1"', "repeated name 'q1' in joint Element 'joint', line "),
     "negative mass": ('mass="0.3"', 'mass="-0.3"', "mass and inertia of moving bodies must be larger than"),
     "NaN": ('pos="0 0 0.3"', 'pos="0 0 nan"', "m.xml:"),
-    "another file": ("<worldbody>", '<include file="x.xml"/><worldbody>', "<include> reads another file"),
-    "no mechanism": ('<text name="mechanism" data="asym_2rss_ppap"/>', "", "there is no closed form to validate"),
+    "another file": ("<worldbody>", '<include file="x.xml"/><worldbody>', "m.xml:53: <include file="),
+    "no mechanism": ('<text name="mechanism" data="asym_2rss_ppap"/>', "", "m has no candidate \"lumped\""),
     "unknown mechanism": ('data="asym_2rss_ppap"', 'data="asym"', 'unknown mechanism "asym"'),
     "no motor": ('<motor name="q3" joint="q3"/>', "", "q3"),
     "mass centre off the axis": ('<inertial pos="0 0 0.15"', '<inertial pos="0.01 0 0.15"', "on the axis"),
@@ -278,7 +278,7 @@ def test_loops_that_the_reference_cannot_close(workbench: Workbench, monkeypatch
     def no_loop(*_: object, **__: object) -> None:
         raise ModelError("m.xml: the loops cannot be closed from the home pose")
 
-    monkeypatch.setattr("workbench.campaign.compare.MujocoReference", no_loop)
+    monkeypatch.setattr("workbench.capabilities.robot.MujocoReference", no_loop)
     line = refused(workbench, workbench.write(SMALL))
     assert line == 'workbench: small.toml: case "first": m.xml: the loops cannot be closed from the home pose'
 
@@ -293,7 +293,7 @@ def test_loops_that_the_reference_cannot_close(workbench: Workbench, monkeypatch
         ("", "no such file"),
         ("x" * 3000, "File name too long"),
         ("a\0b", "no such file"),
-        ("small.toml", "not well-formed XML"),
+        ("small.toml", "small.toml: candidate: unknown key; valid: actuated"),
         ("link.xml", "a link that leads out of"),
     ],
     ids=["absolute", "up", "unknown", "directory", "empty", "long", "null", "no XML", "link out"],
@@ -306,7 +306,9 @@ def test_model_path(workbench: Workbench, name: str, expected: str) -> None:
     assert len(line) < 500
 
 
-@pytest.mark.parametrize(("name", "expected"), [("absent.xml", "no such model file"), (".", "model")])
+@pytest.mark.parametrize(
+    ("name", "expected"), [("absent.xml", "no such model file"), (".", "a robot is a folder with one")]
+)
 def test_model_of_the_command_line(workbench: Workbench, name: str, expected: str) -> None:
     assert expected in refused(workbench, workbench.write(SMALL), "--model", name)
 

@@ -62,7 +62,7 @@ def test_each_force_counts_in_torque_and_power(tmp_path: Path, name: str) -> Non
     plain = reference(tmp_path, FOURBAR).inverse_dynamics(q, qd, qdd).tau
     found = reference(tmp_path, with_feature(name))
     result = found.inverse_dynamics(q, qd, qdd)
-    oracle = NullSpaceOracle(found.text, ["crank"])
+    oracle = NullSpaceOracle(found.spec(), ["crank"])
     home = np.array(oracle.model.key_qpos[0])
     peak = np.abs(result.tau).max()
     for s in range(0, len(q), 6):
