@@ -54,7 +54,7 @@ def test_a_key_that_is_missing_is_seen(page: str) -> None:
 def test_the_example_is_a_robot(page: str, repository: Path, tmp_path: Path) -> None:
     shutil.copytree(repository / "examples" / "fivebar", tmp_path / "fivebar")
     (tmp_path / "fivebar" / "robot.toml").write_text(
-        page.split("```toml robot.toml\n")[1].split("```")[0], encoding="utf-8"
+        page.split("```toml robot.toml\n")[1].split("```", maxsplit=1)[0], encoding="utf-8"
     )
     robot = wb.load_robot(tmp_path / "fivebar", m=0.5, a=0.21)
     assert robot.mass_models == ("distributed", "lumped")
