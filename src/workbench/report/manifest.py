@@ -189,6 +189,19 @@ class SpentRecord(Record):
     bodies: dict[str, dict[str, float | None]] = Field(default_factory=dict)
 
 
+class KinematicsRecord(Record):
+    """A user's kinematics formula against the reference, one coordinate."""
+
+    name: str
+    kind: str
+    coordinate: str
+    error: float | None
+    scale: float | None = None
+    unit: str = ""
+    bound: float
+    verdict: Literal["pass", "fail"]
+
+
 class CaseRecord(Record):
     """One case: its status and the scalar evidence about mechanism and reference. Missing evidence is None."""
 
@@ -221,6 +234,7 @@ class CaseRecord(Record):
     evidence: EvidenceRecord = EvidenceRecord()
     drawing: DrawingRecord | None = None
     spent: SpentRecord = SpentRecord()
+    kinematics_checks: tuple[KinematicsRecord, ...] = ()
     warnings: tuple[str, ...] = ()
 
 
