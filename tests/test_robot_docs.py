@@ -61,6 +61,16 @@ def test_the_example_is_a_robot(page: str, repository: Path, tmp_path: Path) -> 
     assert (robot.values["m1"], robot.values["m2"], robot.values["a"]) == (0.5, 0.5, 0.21)
 
 
+def test_the_python_example_prints_what_it_says(
+    page: str, repository: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = page.split("## From Python\n\n```python\n")[1].split("```", maxsplit=1)[0]
+    monkeypatch.chdir(repository)
+    exec(compile(code, "robots.md", "exec"), {})
+    expected = [line.removeprefix("# prints ") for line in code.splitlines() if line.startswith("# prints ")]
+    assert capsys.readouterr().out.splitlines() == expected != []
+
+
 def test_links_of_the_page_lead_somewhere(page: str, repository: Path) -> None:
     targets = re.findall(r"\]\(([^)]+)\)", page)
     assert len(targets) > 10
