@@ -44,7 +44,9 @@ MISTAKES = {
     "model missing": ('"slider.xml"', '"slyder.xml"', ('model = "slyder.xml"', "no such file")),
     "site and body": ('site = "pin"', 'site = "pin", body = "slider"', ("platform", "either site or body")),
     "no such site": ('site = "pin"', 'site = "pinn"', ("platform.site", 'no site "pinn"', '"pin"')),
-    "no such joint": ('actuated = ["crank"]', 'actuated = ["crank", "slyde"]', ("actuated", 'no joint "slyde"', '"slide"')),
+    "no such joint": (
+        'actuated = ["crank"]', 'actuated = ["crank", "slyde"]', ("actuated", 'no joint "slyde"', '"slide"'),
+    ),
     "initial of no joint": ("elbow = -1.2", "elbo = -1.2", ("initial", "elbo", '"elbow"')),
     "bar of no body": ('bodies = ["crank"]', 'bodies = ["crnk"]', ("bars", 'no body "crnk"')),
     "bar of no parameter": ('mass = "m1"', 'mass = "mm"', ("bars[1]", 'no parameter "mm"')),
