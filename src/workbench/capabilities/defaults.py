@@ -46,4 +46,4 @@ def robot_of_model(loaded: LoadedModel) -> LoadedModel:
         lumped=(custom_text(model, "lumped_bodies") or "").split(),
     )
     robot = RobotFile(Path(file), file, spec)
-    return dataclasses.replace(loaded, description=Description(robot, (), None), values={})
+    return dataclasses.replace(loaded, description=Description(robot, (), None, robot.table), values={})

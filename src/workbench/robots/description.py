@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import mujoco
 import numpy as np
 
 from workbench.errors import ModelError, SpecError, did_you_mean
-from workbench.mjcf.text import Element, find, tokens
+from workbench.mjcf.text import Element, find, tokens, written
 from workbench.robots.assumptions.layout import Layout
 from workbench.robots.closed_form import ClosedForm
 from workbench.robots.formulas import bundled_closed_form
 from workbench.robots.parameter_set import parameter_type
-from workbench.robots.parameters import ParameterTable, Target
+from workbench.robots.parameters import ParameterInfo, ParameterTable, Target
 from workbench.robots.places import AXES, kind_of
 from workbench.robots.robot_file import BarSpec, RobotFile
 
@@ -29,16 +29,13 @@ class Description:
     """all places of parameters, and what follows in bodies that are bars"""
     closed_form: type[ClosedForm] | None
     """the package's own formulas; a user's are offered later, by whoever may run them"""
+    table: ParameterTable
+    """the parameters with their ranges, groups and bars"""
 
     @property
     def name(self) -> str:
         """The robot's name."""
         return self.robot.spec.name
-
-    @property
-    def table(self) -> ParameterTable:
-        """The parameters with their ranges, groups and bars."""
-        return self.robot.table
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -64,11 +61,89 @@ def describe(robot: RobotFile, model: mujoco.MjModel, text: str, elements: list[
     ModelError
         A bar whose body is none: no such body, or one that lies along no axis of its own.
     """
-    bars = [t for bar in robot.spec.bars for body in bar.bodies for t in _bar(bar, body, robot, model, text, elements)]
     closed_form = bundled_closed_form(robot) if robot.builtin else None
     if closed_form is None or closed_form.layout is None:  # a layout says it better, with all that it needs
+        _refuse_absent(robot, model)
         _refuse_missing(robot, model, elements)
-    return Description(robot, (*robot.targets, *bars), closed_form)
+    following, bars = [], []
+    for spec, bar in zip(robot.spec.bars, robot.table.bars, strict=True):
+        found = [t for body in spec.bodies for t in _bar(spec, body, robot, model, text, elements)]
+        own = _own(found, robot, text, elements)
+        following += [t for t in found if all(t is not made for _, made, _ in own)]
+        bars.append(replace(bar, own=own))
+    table = replace(robot.table, infos=_with_units(robot, model), bars=tuple(bars))
+    return Description(robot, (*robot.targets, *following), closed_form, table)
+
+
+def _own(
+    made: list[Target], robot: RobotFile, text: str, elements: list[Element]
+) -> tuple[tuple[str, Target, Target], ...]:
+    """Numbers of a bar's bodies that stand in the file as parameters of their own: the parameter follows the bar."""
+    places = {(t.element, t.name, t.attribute, t.index): t for t in robot.targets if not t.optional}
+    found = []
+    for target in made:
+        place = places.get((target.element, target.name, target.attribute, target.index))
+        if place is None or (place.reads is None and len(place.of) > 1):
+            continue
+        stands = written(text, elements, target.element, target.name, target.attribute)
+        if stands is not None and len(tokens(text, *stands)) > target.index:
+            found.append((place.reads or place.of[0], target, place))
+    return tuple(found)
+
+
+def _with_units(robot: RobotFile, model: mujoco.MjModel) -> dict[str, ParameterInfo]:
+    """The parameters, with the unit of a hinge or of a slide where the place is a joint's.
+
+    Raises
+    ------
+    SpecError
+        The robot file says the other one.
+    """
+    infos = dict(robot.table.infos)
+    for target in robot.targets:
+        units = kind_of(target).unit.split("|")
+        if target.reads is None or len(target.of) > 1 or len(units) < 2:
+            continue
+        index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, target.name)
+        if index < 0:
+            continue
+        unit, said = units[model.jnt_type[index] != mujoco.mjtJoint.mjJNT_SLIDE], infos[target.reads].unit
+        if said in units and said != unit:
+            raise SpecError(
+                f'{robot.shown}: parameters.{target.reads}: unit = "{said}"; "{target.words}" holds {unit}, as all of'
+                " an MJCF in SI",
+                key=target.reads,
+            )
+        if said == " or ".join(units):
+            infos[target.reads] = replace(infos[target.reads], unit=unit)
+    return infos
+
+
+def _refuse_absent(robot: RobotFile, model: mujoco.MjModel) -> None:
+    """Refuse bodies, sites and joints that the robot file names outside of its parameters and the model does not have.
+
+    Raises
+    ------
+    SpecError
+        Naming file, key and the nearest one that exists.
+    """
+    if robot.section == "read":
+        return  # a campaign's own keys: `workbench.mjcf.setup` speaks of them by their names
+    spec = robot.spec
+    named = [("platform.site", "site", spec.platform.site), ("platform.body", "body", spec.platform.body)]
+    named += [("base", "body", spec.base), ("fix_base", "body", spec.fix_base)]
+    named += [("actuated", "joint", name) for name in spec.actuated]
+    named += [("initial", "joint", name) for name in spec.initial]
+    named += [("lumped", "body", name) for name in spec.lumped]
+    for key, what, name in named:
+        if name and mujoco.mj_name2id(model, OBJECTS[what], name) < 0:
+            hint = did_you_mean(name, _names(model, what))
+            raise SpecError(f'{robot.shown}: {key}: no {what} "{name}" in {robot.spec.model}{hint}', key=key)
+
+
+def _names(model: mujoco.MjModel, what: str) -> set[str]:
+    every = range(getattr(model, COUNTS[what]))
+    return {name for i in every if (name := mujoco.mj_id2name(model, OBJECTS[what], i))}
 
 
 OBJECTS = {
@@ -88,16 +163,13 @@ def _refuse_missing(robot: RobotFile, model: mujoco.MjModel, elements: list[Elem
         Naming parameter, place, element and the nearest one that exists.
     """
     for target in robot.targets:
-        if target.optional:
-            continue
         for what, name in zip(kind_of(target).elements, target.name.split("\n"), strict=False):
             if what == "geom":
                 known = [e.name or e.body for e in elements if e.tag == "geom" and (e.name or e.body)]
                 missing = find(elements, "geom", name) is None
             else:
                 missing = mujoco.mj_name2id(model, OBJECTS[what], name) < 0
-                every = range(getattr(model, COUNTS[what]))
-                known = [n for i in every if (n := mujoco.mj_id2name(model, OBJECTS[what], i))]
+                known = list(_names(model, what))
             if missing:
                 hint = did_you_mean(name, set(known))
                 raise SpecError(

@@ -98,12 +98,24 @@ class Bar:
     inertia: tuple[str, ...] = ()
     centre: str | None = None
     """fraction of the length at which the mass centre lies"""
+    own: tuple[tuple[str, Target, Target], ...] = ()
+    """numbers of the bar's bodies that are parameters, too: name, what the bar makes of the number, where it stands"""
+
+    @property
+    def inertias(self) -> tuple[str, ...]:
+        """Parameters that hold an inertia of the bar: one that is given says that the bar is uniform no longer."""
+        return (*self.inertia, *(name for name, _, place in self.own if place.attribute == "diaginertia"))
 
     def follow(self, values: Mapping[str, float]) -> dict[str, float]:
         """What mass and length make of inertia and mass centre."""
         length = values[self.length] * (2.0 if self.half else 1.0)
         found = dict.fromkeys(self.inertia, values[self.mass] * length**2 / 12)
-        return found | ({self.centre: 0.5} if self.centre else {})
+        found |= {self.centre: 0.5} if self.centre else {}
+        for name, made, place in self.own:
+            others = place.factor * math.prod(values[other] for other in place.of if other != name)
+            if others:
+                found[name] = made.number(values) / others
+        return found
 
 
 @dataclass(frozen=True)
@@ -190,7 +202,7 @@ class ParameterTable:
         self.check(result)
         for bar in self.bars:
             moved = any(name in given and given[name] != values[name] for name in (bar.mass, bar.length))
-            if moved and not any(name in given for name in bar.inertia):
+            if moved and not any(name in given for name in bar.inertias):
                 result |= {name: value for name, value in bar.follow(result).items() if name not in given}
         self.check(result)
         return result

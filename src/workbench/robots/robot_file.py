@@ -128,7 +128,7 @@ class RobotSpec(Strict):
     bars: list[BarSpec] = Field(default_factory=list)
 
 
-FORM = Form(RobotSpec, sections={"platform": PlatformSpec, "parameters": RobotSpec, "bars": BarSpec})
+FORM = Form(RobotSpec, sections={"platform": PlatformSpec, "parameters": ParameterSpec, "bars": BarSpec})
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +257,7 @@ class RobotFile:
 
     def key_of(self, target: Target) -> str:
         """Key of the place that a target stands for, for messages."""
-        return self._key(target.reads or target.of[0], "at")
+        return self._key(target.reads or target.of[0], "follows" if target.optional else "at")
 
     def _key(self, name: str, key: str = "") -> str:
         return f"read.{name}" if self.section == "read" else ".".join(["parameters", name, *([key] if key else [])])

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.errors import ModelError, did_you_mean
+from workbench.errors import ModelError, ParameterError, did_you_mean
 from workbench.mjcf.text import (
     PLAIN_DIGITS,
     Edit,
@@ -171,7 +171,10 @@ def read_parameters(
         token = _token(text, elements, target) if len(target.of) > 1 else ""
         value = _exact_quotient(token, found, target.factor, others)
         values[target.reads] = (quotient(found / target.factor, others) if value is None else value) + 0.0
-    description.table.check(values)
+    try:
+        description.table.check(values)
+    except ParameterError as error:
+        raise ParameterError(f"{file}: {error}", **error.facts) from error
     return {name: values[name] for name in description.table.infos}
 
 
