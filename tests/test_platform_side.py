@@ -324,3 +324,11 @@ def test_no_samples_and_the_platforms_turning(tmp_path: Path) -> None:
     assert np.abs(found.rotation - turned.as_matrix()).max() < SAME
     assert np.abs(found.omega - xd[:, 2:] * [[0.0, 1.0, 0.0]]).max() < SAME
     assert np.abs(found.alpha - xdd[:, 2:] * [[0.0, 1.0, 0.0]]).max() < SAME * 10
+
+
+def test_a_box_leaves_out_probes_that_cannot_be_followed(repository: Path) -> None:
+    """With shorter cranks some poses can be assembled, but the way there from home passes a singular pose."""
+    robot = wb.load_robot(repository / "examples" / "fivebar").with_parameters(a=0.21)
+    low, high = robot.reach_box()
+    assert (high > low).all()
+    assert np.isfinite([low, high]).all()
