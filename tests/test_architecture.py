@@ -28,6 +28,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("mjcf",),
     (
         "motion",
+        "delimited",
         "metrics",
         "dry_friction",
         "staging",

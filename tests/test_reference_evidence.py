@@ -173,9 +173,10 @@ def test_steps_are_shortened_at_the_edge_of_the_workspace(planar: wb.MujocoRefer
     height, middle = 0.01, 0.3
     limb = np.hypot(height, middle)
     q, qd, qdd = np.array([[limb, 0.31, limb]]), np.array([[-0.003, 0.1, -0.003]]), np.zeros((1, 3))
+    qpos = planar.inverse_dynamics(q, qd, qdd).qpos
     scale = power.time_scale(qd, qdd)
     with pytest.raises(MotionError):
-        power._difference(planar, q, qd, qdd, "distributed", power.FIRST_STEP * scale)
+        power._difference(planar, qpos, q, qd, qdd, "distributed", power.FIRST_STEP * scale)
     assert power_balance(planar, q, qd, qdd).relative < 1e-6
 
 

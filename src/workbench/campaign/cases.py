@@ -27,9 +27,10 @@ from workbench.motion import (
     JointMotion,
     PickAndPlace,
     PlatformMotion,
-    from_csv,
+    judged,
     multi_sine,
     pick_and_place,
+    read_joints,
     sine,
     time_grid,
 )
@@ -260,10 +261,10 @@ def _resolve(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float
     try:
         if isinstance(planned, PlatformMotion):
             q, qd, qdd = robot.joint_motion(planned.x, planned.xd, planned.xdd)
-            motion = JointMotion(planned.t, q, qd, qdd)
+            motion = JointMotion(planned.t, q, qd, qdd, planned.warnings)
         else:
             motion = planned
-        x, xd, xdd = robot.platform_motion(motion.q, motion.qd, motion.qdd)
+        x, xd, xdd = robot.platform_along(motion.t, motion.q, motion.qd, motion.qdd)
         robot.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
     except MotionError as error:
         raise with_unit_hint(at_time(error, planned.t), robot) from error
@@ -299,7 +300,8 @@ def plan_motion(spec: CaseSpec, file: Path, robot: Robot) -> JointMotion | Platf
     """
     motion = spec.motion
     if isinstance(motion, CsvMotion):
-        return from_csv(locate(file, motion.file, "motion.file"), robot.joints)
+        place = locate(file, motion.file, "motion.file")
+        return judged(read_joints(place, robot.joints, units=robot.coordinate_units))
     if isinstance(motion, CycleMotion):
         return pick_and_place(**motion.model_dump(exclude={"kind"}))
     joints = len(motion.terms) if isinstance(motion, MultiSineMotion) else len(motion.amplitude)

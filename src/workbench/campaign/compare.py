@@ -99,7 +99,9 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     series = _motion_columns(case)
     try:
         for mass_model in dict.fromkeys(c.reference for c in campaign.candidate) or ("distributed",):
-            results[mass_model] = reference.inverse_dynamics(motion.q, motion.qd, motion.qdd, mass_model, case.force)
+            results[mass_model] = reference.inverse_dynamics(
+                motion.q, motion.qd, motion.qdd, mass_model, case.force, along=motion.t
+            )
         computed = torques_of(case, dict.fromkeys(c.name for c in campaign.candidate))
         torques = computed.torques
     except MotionError as error:
@@ -159,7 +161,7 @@ def _raw_rows(
     motion = case.motion
     name = "distributed" if "distributed" in results else next(iter(results))
     spec = CandidateSpec(name=RAW_NAME, reference=name)
-    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force)
+    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force, motion.t)
     rows = _rows(case, spec, tau, results[name], evidence)
     return [dataclasses.replace(row, candidate=RAW_INVERSE, kind=CONTRAST) for row in rows]
 
@@ -259,5 +261,8 @@ def _facts(
         "conditions": [dataclasses.asdict(c) for c in case.robot.conditions(case.motion.q)],
         "solutions_at_start": case.robot.assembly_solutions(case.motion.q[:1])[0].tolist(),
         "peak_reactions": {name: float(np.linalg.norm(f, axis=1).max()) for name, f in result.reactions.items()},
-        "warnings": case.robot.warnings(case.motion.t, case.motion.q, case.motion.qd),
+        "warnings": [
+            *case.motion.warnings,
+            *case.robot.warnings(case.motion.t, case.motion.q, case.motion.qd),
+        ],
     }

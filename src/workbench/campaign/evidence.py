@@ -138,7 +138,7 @@ def gather_evidence(
     if not effort.budget:
         return Evidence(spread=spread, times=motion.t)
     power = {
-        name: power_balance(reference, motion.q, motion.qd, motion.qdd, name, force, tau=result.tau)
+        name: power_balance(reference, motion.q, motion.qd, motion.qdd, name, force, tau=result.tau, along=motion.t)
         for name, result in results.items()
     }
     return Evidence(power, spread, _replays(case, reference, candidates), motion.t)

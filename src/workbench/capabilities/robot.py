@@ -254,6 +254,17 @@ class Robot:
             return moved
         return self.reference.platform_motion(self._checked(q), qd, qdd, self.coordinates)
 
+    def platform_along(
+        self, t: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """As `platform_motion`, for samples that are one motion, in the order of times ``(n,)``.
+
+        Closed forms know their branch from q alone; what closes loops step by step follows the motion.
+        """
+        if self._own("platform_motion"):
+            return self.platform_motion(q, qd, qdd)
+        return self.reference.platform_motion(self._checked(q), qd, qdd, self.coordinates, along=t)
+
     @one_or_many(1)
     def jacobian(self, q: ArrayLike) -> FloatArray:
         """J of shape ``(n, m, na)`` with xd = J qd."""

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray
-from workbench.errors import MotionError
+from workbench.errors import MotionError, did_you_mean
 from workbench.motion.checks import as_number
 from workbench.motion.spline import interpolating_spline
 
 MAX_SAMPLES = 10_000_000
 """A grid or file with more samples is taken for a slip (a rate in the wrong unit) and refused while memory lasts."""
+
+COORDINATES = {"x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
+"""Task coordinates of a platform and their units: positions of its site, and rotations, in the base body's frame."""
+
+POSITION = ("x", "y", "z")
+"""Task coordinates where a robot does not say its own."""
 
 _WHOLE_STEPS = 1e-6
 """Fraction of a step by which a duration may miss a whole number of steps and still end on its last sample."""
@@ -58,6 +65,8 @@ class JointMotion:
     q: FloatArray
     qd: FloatArray
     qdd: FloatArray
+    warnings: tuple[str, ...] = ()
+    """what there is to say about the numbers it came from, `workbench.motion.judge`"""
 
     def __post_init__(self) -> None:
         """Check the arrays and keep copies of them."""
@@ -84,31 +93,43 @@ class JointMotion:
 
 @dataclass(frozen=True, eq=False)
 class PlatformMotion:
-    """A motion of the platform, to be turned into joint space by a mechanism's inverse kinematics.
+    """A motion of the platform in task coordinates, to be turned into joint space by a mechanism.
 
     Parameters
     ----------
     t
         Time in seconds, ``(n,)``, strictly increasing.
     x, xd, xdd
-        Position (m), velocity (m/s) and acceleration (m/s^2) of the platform in the paper's frame, each ``(n, 3)``.
+        Task coordinates, their velocities and accelerations, each ``(n, m)``; m, rad, s, in the paper's frame.
+    coordinates
+        Their names, of `COORDINATES`; ``x y z`` where not said.
 
     Raises
     ------
     MotionError
-        Wrong shapes, an entry that is not finite (the message names time and axis), or time that does not increase.
+        Wrong shapes, an entry that is not finite (the message names time and axis), time that does not increase, or
+        names that are no task coordinates.
     """
 
     t: FloatArray
     x: FloatArray
     xd: FloatArray
     xdd: FloatArray
+    coordinates: tuple[str, ...] = POSITION
+    warnings: tuple[str, ...] = ()
+    """as of a `JointMotion`"""
 
     def __post_init__(self) -> None:
         """Check the arrays and keep copies of them."""
-        t, arrays = _checked(self.t, {"x": self.x, "xd": self.xd, "xdd": self.xdd}, 3)
+        object.__setattr__(self, "coordinates", as_coordinates(self.coordinates))
+        t, arrays = _checked(self.t, {"x": self.x, "xd": self.xd, "xdd": self.xdd}, len(self.coordinates))
         for name, array in {"t": t, **arrays}.items():
             object.__setattr__(self, name, array)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """``m`` or ``rad`` for each coordinate."""
+        return tuple(unit_of(name) for name in self.coordinates)
 
     def consistency(self) -> Consistency:
         """Compare the derivatives with the samples they come with, as `JointMotion.consistency`."""
@@ -169,6 +190,27 @@ def time_grid(start: float, stop: float, *, samples: int | None = None, rate: fl
             value=len(grid),
         )
     return grid
+
+
+def unit_of(coordinate: str) -> str:
+    """``m`` or ``rad``: the unit of a task coordinate of `COORDINATES`."""
+    return COORDINATES[as_coordinates([coordinate])[0]]
+
+
+def as_coordinates(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names of task coordinates as a tuple: one to six different ones of `COORDINATES`.
+
+    Raises
+    ------
+    MotionError
+        Anything else.
+    """
+    for name in names:
+        if name not in COORDINATES:
+            raise MotionError(f'task coordinate "{name}"{did_you_mean(str(name), COORDINATES)}', value=name)
+    if not names or len(set(names)) < len(names):
+        raise MotionError(f"task coordinates {', '.join(names) or 'none'}; allowed: one or more, each once")
+    return tuple(names)
 
 
 def as_times(t: ArrayLike) -> FloatArray:

@@ -1,4 +1,4 @@
-"""A pick-and-place cycle planned in platform space, with analytic derivatives.
+"""A pick-and-place cycle planned in task coordinates, with analytic derivatives; rotations run with the traverse.
 
 The cycle is a sum of straight moves, each a displacement times a rest-to-rest time law. Moves may overlap in time,
 which rounds the corners of the path; sums of polynomials stay polynomials, so the derivatives stay exact.
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError, did_you_mean
-from workbench.motion.base import PlatformMotion, as_times, time_grid
+from workbench.motion.base import POSITION, PlatformMotion, as_coordinates, as_times, time_grid, unit_of
 from workbench.motion.checks import as_number, as_vector
 
 LAWS = {"quintic": 2, "septic": 3}
@@ -69,8 +69,8 @@ class Move:
     """s from the start of the cycle"""
     duration: float
     """s"""
-    displacement: tuple[float, float, float]
-    """m"""
+    displacement: tuple[float, ...]
+    """m and rad, in task coordinates"""
 
     @property
     def stop(self) -> float:
@@ -85,12 +85,14 @@ class PickAndPlace:
     Parameters
     ----------
     pick, place
-        Platform positions, m, in the paper's frame. At different heights the traverse is inclined.
+        Platform poses in task coordinates, m and rad, in the paper's frame. At different heights the traverse is
+        inclined; rotations run with the traverse, by the same law.
     lift
-        Height in metres along *up*, > 0; or the lift itself as a vector ``(3,)`` in metres, without *up*. The vector
+        Height in metres along *up*, > 0; or the lift itself as a vector in task coordinates, without *up*. The vector
         is what the attribute holds afterwards, and *up* is None.
     up
-        Direction away from the ground, any length: (0, 0, -1) where x3 points down, (0, 1, 0) where y points up.
+        Direction away from the ground, any length: (0, 0, -1) where x3 points down, (0, 1, 0) where y points up. One
+        number for each position among the task coordinates; zeros for the rotations may follow in their places.
     lift_time, traverse_time, lower_time
         Durations in seconds, > 0; *lower_time* None is *lift_time*.
     dwell
@@ -103,6 +105,8 @@ class PickAndPlace:
         True: return to the pick pose, so that cycles can be joined.
     law
         Time law of each move, a key of `LAWS`.
+    coordinates
+        Names of the task coordinates, of `workbench.motion.base.COORDINATES`; ``x y z`` where not said.
 
     Raises
     ------
@@ -121,12 +125,15 @@ class PickAndPlace:
     overlap: float = 0.0
     back: bool = False
     law: str = "quintic"
+    coordinates: Sequence[str] = POSITION
 
     def __post_init__(self) -> None:
         """Check every number, and resolve *lift* with *up* and *lower_time* to what they stand for."""
+        names = as_coordinates(self.coordinates)
+        _set(self, "coordinates", names)
         for name in ("pick", "place"):
-            _set(self, name, tuple(as_vector(f"pick and place: {name}", getattr(self, name), "m", 3)))
-        _set(self, "lift", _lift_vector(self.lift, self.up))
+            _set(self, name, tuple(_in_coordinates(name, getattr(self, name), names)))
+        _set(self, "lift", _lift_vector(self.lift, self.up, names))
         _set(self, "up", None)
         if self.lower_time is None:
             _set(self, "lower_time", self.lift_time)
@@ -161,9 +168,9 @@ class PickAndPlace:
             traverse = clock + (1.0 - self.overlap) * lift_time
             lowering = traverse + self.traverse_time - self.overlap * lower_time
             moves += [
-                Move(f"lift{suffix}", clock, lift_time, _triple(lift)),
-                Move(f"traverse{suffix}", traverse, self.traverse_time, _triple(way)),
-                Move(f"lower{suffix}", lowering, lower_time, _triple(lower)),
+                Move(f"lift{suffix}", clock, lift_time, _plain(lift)),
+                Move(f"traverse{suffix}", traverse, self.traverse_time, _plain(way)),
+                Move(f"lower{suffix}", lowering, lower_time, _plain(lower)),
             ]
             clock = lowering + lower_time + self.dwell
         return tuple(moves)
@@ -192,7 +199,7 @@ class PickAndPlace:
                 x += value[:, None] * displacement
                 xd += first[:, None] * (displacement / move.duration)
                 xdd += second[:, None] * (displacement / move.duration / move.duration)
-        return PlatformMotion(times, x, xd, xdd)
+        return PlatformMotion(times, x, xd, xdd, tuple(self.coordinates))
 
     def _vertical_times(self) -> tuple[float, float]:
         lower_time = self.lift_time if self.lower_time is None else self.lower_time
@@ -212,7 +219,7 @@ def pick_and_place(
     Parameters
     ----------
     pick, place
-        Platform positions, m, in the paper's frame.
+        Platform poses in task coordinates, m and rad, in the paper's frame.
     samples, rate
         As in `time_grid`; exactly one of them.
     **cycle
@@ -231,23 +238,58 @@ def _set(plan: PickAndPlace, name: str, value: object) -> None:
     object.__setattr__(plan, name, value)
 
 
-def _triple(vector: FloatArray) -> tuple[float, float, float]:
-    return float(vector[0]), float(vector[1]), float(vector[2])
+def _plain(vector: FloatArray) -> tuple[float, ...]:
+    return tuple(float(entry) for entry in vector)
 
 
-def _lift_vector(lift: Any, up: Any) -> tuple[float, float, float]:
+def _in_coordinates(what: str, value: Any, names: tuple[str, ...]) -> list[float]:
+    """A pose or displacement, with as many numbers as there are task coordinates."""
+    vector = as_vector(f"pick and place: {what}", value, "")
+    if len(vector) != len(names):
+        raise MotionError(
+            f"pick and place: {what} has {len(vector)} entries; allowed: {len(names)}, the task coordinates"
+            f" {', '.join(names)}",
+            value=len(vector),
+        )
+    return vector
+
+
+def _lift_vector(lift: Any, up: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     if isinstance(lift, Sequence | np.ndarray) and not isinstance(lift, str):
-        vector = np.array(as_vector("pick and place: lift", lift, "m", 3))
+        vector = np.array(_in_coordinates("lift", lift, names))
         if up is not None:
             raise MotionError("pick and place: lift is a vector and up is given too; allowed: a height with up")
         if not vector.any():
-            raise MotionError("pick and place: lift = (0, 0, 0) m; allowed: a vector that is not zero")
-        return _triple(vector)
+            raise MotionError("pick and place: lift is all zeros; allowed: a vector that is not zero")
+        return _plain(vector)
     height = as_number("pick and place: lift", lift, "m", 0.0, minimum_allowed=False)
     if up is None:
         raise MotionError(f"pick and place: lift = {height:g} m without up; allowed: a height with up, or a vector")
-    direction = np.array(as_vector("pick and place: up", up, "", 3))
+    direction = _direction(up, names)
     length = math.hypot(*direction)
     if length == 0.0:
-        raise MotionError("pick and place: up = (0, 0, 0); allowed: a direction, of any length but zero")
-    return _triple(height * (direction / length))
+        raise MotionError("pick and place: up is all zeros; allowed: a direction, of any length but zero")
+    return _plain(height * (direction / length))
+
+
+def _direction(up: Any, names: tuple[str, ...]) -> FloatArray:
+    """*up* in task coordinates: a height is one of positions."""
+    given = as_vector("pick and place: up", up, "")
+    places = [k for k, name in enumerate(names) if unit_of(name) == "m"]
+    direction = np.zeros(len(names))
+    if not places:
+        raise MotionError(
+            f"pick and place: the task coordinates {', '.join(names)} hold no position to lift along; give lift as a"
+            " vector"
+        )
+    if len(given) == len(names):
+        direction[:] = given
+    elif len(given) == len(places):
+        direction[places] = given
+    else:
+        wanted = f"{len(places)}, the positions {', '.join(names[k] for k in places)}"
+        raise MotionError(f"pick and place: up has {len(given)} entries; allowed: {wanted}", value=len(given))
+    turned = [name for k, name in enumerate(names) if k not in places and direction[k] != 0.0]
+    if turned:
+        raise MotionError(f"pick and place: up turns {turned[0]}; allowed: a direction of positions, 0 for rotations")
+    return direction

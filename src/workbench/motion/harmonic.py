@@ -1,4 +1,4 @@
-"""Sinusoidal joint motions, with analytic derivatives ([Almeida2010] eq. (16)-(18) and sums of such terms)."""
+"""Sinusoids of joints and platform, with analytic derivatives ([Almeida2010] eq. (16)-(18) and sums of it)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError
-from workbench.motion.base import JointMotion, as_times
+from workbench.motion.base import POSITION, JointMotion, PlatformMotion, as_coordinates, as_times
 from workbench.motion.checks import as_list, as_number, as_vector
 
 
@@ -87,6 +87,57 @@ def multi_sine(t: ArrayLike, offset: Sequence[float], terms: Sequence[Sequence[S
             with np.errstate(over="ignore", invalid="ignore"):
                 _add(harmonic, times, q[:, joint], qd[:, joint], qdd[:, joint])
     return JointMotion(times, q, qd, qdd)
+
+
+def platform_sine(
+    t: ArrayLike,
+    offset: Sequence[float],
+    amplitude: Sequence[float],
+    frequency: Sequence[float],
+    phase: Sequence[float] | None = None,
+    coordinates: Sequence[str] = POSITION,
+) -> PlatformMotion:
+    """As `sine`, one sinusoid per task coordinate; *coordinates* names them, m or rad each.
+
+    Raises
+    ------
+    MotionError
+        As `sine`, and another number of entries than of coordinates.
+    """
+    names = as_coordinates(coordinates)
+    _check_width("platform_sine", offset, names)
+    return _of_platform(sine(t, offset, amplitude, frequency, phase), names)
+
+
+def platform_multi_sine(
+    t: ArrayLike,
+    offset: Sequence[float],
+    terms: Sequence[Sequence[Sequence[float]]],
+    coordinates: Sequence[str] = POSITION,
+) -> PlatformMotion:
+    """As `multi_sine`, any number of sinusoids per task coordinate; *coordinates* names them, m or rad each.
+
+    Raises
+    ------
+    MotionError
+        As `multi_sine`, and another number of entries than of coordinates.
+    """
+    names = as_coordinates(coordinates)
+    _check_width("platform_multi_sine", offset, names)
+    return _of_platform(multi_sine(t, offset, terms), names)
+
+
+def _check_width(kind: str, offset: Sequence[float], names: tuple[str, ...]) -> None:
+    count = len(as_vector(f"{kind}: offset", offset, ""))
+    if count != len(names):
+        raise MotionError(
+            f"{kind}: offset has {count} entries; allowed: {len(names)}, the task coordinates {', '.join(names)}",
+            value=count,
+        )
+
+
+def _of_platform(found: JointMotion, names: tuple[str, ...]) -> PlatformMotion:
+    return PlatformMotion(found.t, found.q, found.qd, found.qdd, names)
 
 
 def _add(harmonic: Harmonic, t: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
-from workbench.reference.continuation import ASTRAY, CLOSED, NEWTON_STEPS, Assembly, Continuation
+from workbench.reference.along import OrderedClosure
+from workbench.reference.continuation import ASTRAY, CLOSED, NEWTON_STEPS, Assembly
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import integrate, newton_step
 from workbench.reference.rows import constraint_rows
@@ -21,7 +22,7 @@ LONGEST_FREE_STEP = 0.2
 """rad or m: damped, so that an open home pose closes on the branch that it is nearest to."""
 
 
-class LoopCloser(Continuation):
+class LoopCloser(OrderedClosure):
     """Closes the loops of one model."""
 
     def __init__(self, engine: Engine, structure: Structure) -> None:

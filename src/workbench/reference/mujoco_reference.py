@@ -15,11 +15,12 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from workbench.arrays import FloatArray, as_batches, as_force
+from workbench.arrays import FloatArray, as_batch, as_batches, as_force, as_rows, same_lengths
 from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf.compile import custom_text
 from workbench.mjcf.setup import Setup
+from workbench.reference.along import refuse_jumps
 from workbench.reference.closure import LoopCloser
 from workbench.reference.continuation import Assembly
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
@@ -132,7 +133,7 @@ class MujocoReference(PlatformSide):
         self._tables = tables.closures, tables.joints, tables.split, tables.bodies
         self._reaction_rows = reaction_rows(loaded.model, self._structure)
         self._leader: tuple[MujocoReference, np.ndarray] | None = None
-        self._closed: tuple[FloatArray, Assembly] | None = None
+        self._closed: tuple[FloatArray, Assembly, bool] | None = None
         self._platform: dict[tuple[str, ...], PlatformCloser] = {}
         self._base_rotation = np.eye(3)
         self._locate_base()
@@ -166,9 +167,9 @@ class MujocoReference(PlatformSide):
         """The same model driven by as many actuators as there are freedoms, and their places among all."""
         return self._leader or (self, slice(None))
 
-    def tangent(self, q: FloatArray) -> FloatArray:
-        """All velocities per actuated one, ``(n, nv, na)``."""
-        return self._assemble(q).tangent
+    def tangent(self, q: FloatArray, ordered: bool = False, near: ArrayLike | None = None) -> FloatArray:
+        """All velocities per actuated one, ``(n, nv, na)``; samples closed as `inverse_dynamics` does."""
+        return self._assemble(q, ordered, near).tangent
 
     @property
     def text(self) -> str:
@@ -214,6 +215,9 @@ class MujocoReference(PlatformSide):
         qdd: ArrayLike,
         mass_model: str = "distributed",
         external_force: ArrayLike | None = None,
+        *,
+        along: ArrayLike | None = None,
+        near: ArrayLike | None = None,
     ) -> ReferenceResult:
         """Actuator forces that produce a motion, with everything needed to judge them.
 
@@ -225,11 +229,18 @@ class MujocoReference(PlatformSide):
             ``"distributed"``, the model as it is, or ``"lumped"``, bars without rotational inertia.
         external_force
             Newtons, base (paper) frame, acting on the platform site: ``(3,)`` or ``(n, 3)``.
+        along
+            Times ``(n,)``, s, of samples that are one motion: each is closed from its predecessor, and jumps are
+            refused. None: every sample is closed from home by straight lines, which is another assembly where the
+            motion runs around a cusp of the singular curve.
+        near
+            Closed configurations ``(n, nq)``, as `ReferenceResult.qpos`, from which the samples are closed instead.
 
         Raises
         ------
         MotionError
             A sample that cannot be closed on the home branch, or a singular pose; the message names sample and joint.
+            With *along* also a sample that jumps: farther from the one before than rates and step allow.
         ArrayError
             Wrong shapes or entries that are not finite.
         ParameterError
@@ -241,12 +252,15 @@ class MujocoReference(PlatformSide):
         if n == 0:
             return self._no_samples(mass_model)
         if self._leader:
-            return shared(*self._leader, structure, q, qd, qdd, mass_model, external_force)
+            return shared(*self._leader, structure, q, qd, qdd, mass_model, external_force, along, near)
         # for the kernels, arrays that may not be written to are another type
         qd, qdd = np.require(qd, requirements="W"), np.require(qdd, requirements="W")
         force = np.ascontiguousarray(as_force("external_force", external_force, n) @ self._base_rotation.T)
         engine = self._engine(mass_model)
-        model, assembly = engine.model, self._assemble(q)
+        times = None if along is None else as_rows("along", np.reshape(along, (-1, 1)), 1)[:, 0]
+        if times is not None:
+            same_lengths(q=q, along=times)
+        model, assembly = engine.model, self._assemble(q, along is not None, near)
         qpos, (qvel, qacc) = assembly.qpos, np.zeros((2, n, model.nv))
         tau, motion, energy = np.zeros_like(q), np.zeros((3, n, 3)), np.zeros((n, 2))
         turning = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
@@ -270,6 +284,8 @@ class MujocoReference(PlatformSide):
 
         engine.in_blocks(block, n)
         self._refuse_singular(q, qd, assembly.rank, velocity_residual, assembly.weakest)
+        if times is not None:
+            refuse_jumps(times, structure, self._closer.joints, qpos, qvel, qacc)
         # in MuJoCo dry friction is a constraint, so neither bias nor passive forces hold it
         tau += model.dof_frictionloss[structure.actuated] * direction(qd)
         return ReferenceResult(
@@ -318,9 +334,11 @@ class MujocoReference(PlatformSide):
     def _nbody(self) -> int:
         return int(self._engines["distributed"].model.nbody)
 
-    def _assemble(self, q: FloatArray) -> Assembly:
-        if self._closed is None or not np.array_equal(self._closed[0], q):
-            self._closed = (q.copy(), self._closer.close(q))
+    def _assemble(self, q: FloatArray, ordered: bool = False, near: ArrayLike | None = None) -> Assembly:
+        if near is not None:
+            return self._closer.close_near(q, as_batch("near", near, len(self._closer.home)))
+        if self._closed is None or self._closed[2] != ordered or not np.array_equal(self._closed[0], q):
+            self._closed = (q.copy(), self._closer.close_along(q) if ordered else self._closer.close(q), ordered)
         return self._closed[1]
 
     def _locate_base(self) -> None:

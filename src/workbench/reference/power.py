@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch, as_batches, as_force
 from workbench.errors import ArrayError, MotionError
-from workbench.reference.mujoco_reference import MujocoReference
+from workbench.reference.mujoco_reference import MujocoReference, ReferenceResult
 
 MOST_SAMPLES = 150
 """Samples looked at; a longer motion is thinned out evenly, and the samples of greatest power are always kept."""
@@ -40,6 +40,9 @@ without acceleration has a time scale too."""
 SHRINKINGS = 6
 """How often the first step is halved where a displaced sample leaves the workspace."""
 
+ROUNDING = 1e-13
+"""Of the energy: what its rounding may pretend between two samples."""
+
 WEIGHTS = (6 / 7, -15 / 56, 5 / 63, -1 / 56, 1 / 385, -1 / 5544)
 """Twelfth-order central difference: the weights of f(+k h) - f(-k h), k = 1 to 6."""
 
@@ -63,8 +66,8 @@ class PowerBalance:
     peak_power: float
     """max |tau . qd| over all n samples, the normaliser, W"""
     relative: float
-    """max |residual| / peak_power; NaN where the torques hold NaN and where nothing moves: a balance of nothing judges
-    nothing, and NaN satisfies no bound"""
+    """max |residual| / peak_power, or more where energy jumps between samples of a motion; NaN where the torques hold
+    NaN and where nothing moves: a balance of nothing judges nothing, and NaN satisfies no bound"""
     worst_sample: int
     """index into the n samples of the largest |residual|"""
     differentiation: float
@@ -79,6 +82,7 @@ def power_balance(
     mass_model: str = "distributed",
     external_force: ArrayLike | None = None,
     tau: ArrayLike | None = None,
+    along: ArrayLike | None = None,
 ) -> PowerBalance:
     """Hold torques against the rate of MuJoCo's energy.
 
@@ -94,6 +98,8 @@ def power_balance(
         Newtons, paper frame, acting on the platform: ``(3,)`` or ``(n, 3)``.
     tau
         Torques to judge, ``(n, na)``; None judges the reference's own.
+    along
+        Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
 
     Raises
     ------
@@ -107,12 +113,13 @@ def power_balance(
     if not len(q):
         raise ArrayError("q: expected at least one sample, got none")
     force = as_force("external_force", external_force, len(q))
-    result = reference.inverse_dynamics(q, qd, qdd, mass_model, force)
+    result = reference.inverse_dynamics(q, qd, qdd, mass_model, force, along=along)
     torques = result.tau if tau is None else _same_shape(tau, q)
     power = np.sum(torques * qd, axis=1)
     peak = float(np.abs(power).max())
     kept = _selection(power)
-    storage, doubt = _energy_rate(reference, q[kept], qd[kept], qdd[kept], mass_model)
+    jump = 0.0 if along is None else _energy_jump(reference, result, power, force, mass_model, np.asarray(along))
+    storage, doubt = _energy_rate(reference, result.qpos[kept], q[kept], qd[kept], qdd[kept], mass_model)
     model = reference.compiled(mass_model)
     qvel = result.qvel[kept]
     dissipation = qvel**2 @ np.asarray(model.dof_damping) + np.abs(qvel) @ np.asarray(model.dof_frictionloss)
@@ -127,10 +134,40 @@ def power_balance(
         storage=storage,
         dissipation=dissipation,
         peak_power=peak,
-        relative=_ratio(float(size.max()), peak),
+        relative=_ratio(max(float(size.max()), jump), peak),
         worst_sample=int(kept[int(np.argmax(np.where(np.isnan(size), np.inf, size)))]),
         differentiation=_ratio(float(doubt.max()), peak),
     )
+
+
+def _energy_jump(
+    reference: MujocoReference,
+    result: ReferenceResult,
+    power: FloatArray,
+    force: FloatArray,
+    mass_model: str,
+    t: FloatArray,
+) -> float:
+    """Largest change of energy between neighbours that no power between them accounts for, in watts over the step.
+
+    Whatever rule integrates the power over a step, its error is below the step times how much the power changes around
+    it; a motion that goes on has nothing beyond that, one that jumps to another assembly has its gap in height.
+    """
+    if len(t) < 2:
+        return 0.0
+    model = reference.compiled(mass_model)
+    lost = result.qvel**2 @ np.asarray(model.dof_damping) + np.abs(result.qvel) @ np.asarray(model.dof_frictionloss)
+    put_in = power + np.sum(force * result.xd, axis=1) - lost
+    change = np.diff(result.energy.sum(axis=1)) / np.diff(t)
+    around = np.stack([np.roll(put_in, shift) for shift in (1, 0, -1, -2)])
+    around[0, 0], around[2:, -1], around[3, -2:] = put_in[0], put_in[-1], put_in[-1]
+    low, high = around.min(axis=0)[:-1], around.max(axis=0)[:-1]
+    # as much again to both sides: between the samples the power may peak
+    room = high - low
+    unexplained = np.maximum(change - (high + room), (low - room) - change)
+    if np.isnan(unexplained).any():
+        return float("nan")
+    return max(0.0, float(unexplained.max()) - ROUNDING * float(np.abs(result.energy).max() / np.diff(t).min()))
 
 
 def _same_shape(tau: ArrayLike, q: FloatArray) -> FloatArray:
@@ -165,7 +202,7 @@ def time_scale(qd: FloatArray, qdd: FloatArray) -> float:
 
 
 def _energy_rate(
-    reference: MujocoReference, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str
+    reference: MujocoReference, qpos: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str
 ) -> tuple[FloatArray, FloatArray]:
     """Return dE/dt ``(m,)`` and how far it is in doubt, both in watts."""
     scale = time_scale(qd, qdd)
@@ -174,7 +211,7 @@ def _energy_rate(
     step = FIRST_STEP * scale
     for attempt in range(SHRINKINGS + 1):
         try:
-            rate = _difference(reference, q, qd, qdd, mass_model, step)
+            rate = _difference(reference, qpos, q, qd, qdd, mass_model, step)
             break
         except MotionError:
             # a displaced sample beyond the edge of the workspace; the samples themselves were closed before
@@ -186,7 +223,7 @@ def _energy_rate(
     active = np.arange(len(q))
     for _ in range(HALVINGS):
         step *= 0.5
-        finer = _difference(reference, q[active], qd[active], qdd[active], mass_model, step)
+        finer = _difference(reference, qpos[active], q[active], qd[active], qdd[active], mass_model, step)
         # Richardson: the error of the twelfth-order difference falls by 2^12 with each halving
         refined = finer + (finer - rate[active]) / 4095.0
         gap = np.abs(refined - estimate[active])
@@ -201,19 +238,26 @@ def _energy_rate(
 
 
 def _difference(
-    reference: MujocoReference, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str, step: float
+    reference: MujocoReference,
+    qpos: FloatArray,
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+    mass_model: str,
+    step: float,
 ) -> FloatArray:
     """Twelfth-order central difference of the energy along q + qd t + qdd t^2/2."""
     n = len(q)
     times = step * np.array([sign * k for k in range(1, len(WEIGHTS) + 1) for sign in (1, -1)])[:, None, None]
-    # sample after sample, so that the closure starts each from a neighbour
     moved = (q + qd * times + 0.5 * qdd * times**2).swapaxes(0, 1).reshape(-1, q.shape[1])
     speed = (qd + qdd * times).swapaxes(0, 1).reshape(-1, q.shape[1])
     still = np.zeros_like(moved)
     # along the curve excess actuators would leave the mechanism's motions; the leading ones determine its state
     solver, lead = reference.determining
     moved, speed, still = moved[:, lead], speed[:, lead], still[:, lead]
-    energy = solver.inverse_dynamics(moved, speed, still, mass_model).energy.sum(axis=1).reshape(n, len(WEIGHTS), 2)
+    # each from its own sample's configuration: from home another assembly may be on the way
+    found = solver.inverse_dynamics(moved, speed, still, mass_model, near=np.repeat(qpos, len(times), axis=0))
+    energy = found.energy.sum(axis=1).reshape(n, len(WEIGHTS), 2)
     rate: FloatArray = (energy[:, :, 0] - energy[:, :, 1]) @ np.array(WEIGHTS) / step
     return rate
 

@@ -23,6 +23,7 @@ def raw_mj_inverse(
     qdd: ArrayLike,
     mass_model: str = "distributed",
     external_force: ArrayLike | None = None,
+    along: ArrayLike | None = None,
 ) -> FloatArray:
     """`qfrc_inverse` at the actuated joints, on the exactly closed motion, without projection.
 
@@ -36,6 +37,8 @@ def raw_mj_inverse(
         ``"distributed"`` or ``"lumped"``.
     external_force
         Newtons, paper frame, on the platform: ``(3,)`` or ``(n, 3)``. What it does at the actuated joints is taken off.
+    along
+        Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
 
     Returns
     -------
@@ -50,7 +53,7 @@ def raw_mj_inverse(
     structure = reference.structure
     q, qd, qdd = as_batches(len(structure.actuated), q=q, qd=qd, qdd=qdd)
     force = as_force("external_force", external_force, len(q)) @ reference.base_rotation.T
-    motion = reference.inverse_dynamics(q, qd, qdd, mass_model)
+    motion = reference.inverse_dynamics(q, qd, qdd, mass_model, along=along)
     model = reference.compiled(mass_model)
     data = mujoco.MjData(model)
     point = np.zeros((3, model.nv))

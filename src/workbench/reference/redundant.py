@@ -116,6 +116,8 @@ def shared(
     qdd: FloatArray,
     mass_model: str,
     external_force: ArrayLike | None,
+    along: ArrayLike | None = None,
+    near: ArrayLike | None = None,
 ) -> ReferenceResult:
     """Inverse dynamics of excess actuators: the leading ones give motion and power, all of them share the load.
 
@@ -128,7 +130,8 @@ def shared(
     MotionError
         Positions, rates or accelerations that do not fit together.
     """
-    found = leader.inverse_dynamics(q[:, columns], qd[:, columns], qdd[:, columns], mass_model, external_force)
+    lead = q[:, columns], qd[:, columns], qdd[:, columns]
+    found = leader.inverse_dynamics(*lead, mass_model, external_force, along=along, near=near)
     names = structure.joint_names
     speed = 1.0 + np.abs(qd).max(axis=1, keepdims=True)
     refuse_inconsistent("q", q, found.qpos[:, structure.actuated_qpos], names, CONSISTENT)
@@ -136,7 +139,7 @@ def shared(
     rise = speed**2 + np.abs(qdd).max(axis=1, keepdims=True)
     refuse_inconsistent("qdd", qdd, found.qacc[:, structure.actuated], names, CONSISTENT * rise)
     dry = leader.compiled(mass_model).dof_frictionloss[structure.actuated] * direction(qd)
-    per_lead = leader.tangent(q[:, columns])[:, structure.actuated]
+    per_lead = leader.tangent(q[:, columns], along is not None, near)[:, structure.actuated]
     work = found.tau - dry[:, columns]
     tau = np.matmul(np.linalg.pinv(per_lead.transpose(0, 2, 1)), work[:, :, None])[:, :, 0] + dry
     return dataclasses.replace(found, tau=tau, reactions={})

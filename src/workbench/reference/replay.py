@@ -204,17 +204,14 @@ def replay(
     window = min(stop - start, LONGEST_WINDOW)
     limited_by = "duration" if window < stop - start else ""
 
-    def own(q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-        return reference.inverse_dynamics(q, qd, qdd, "distributed", force).tau
-
     for _ in range(SHRINKINGS):
-        tracked = runner.run({REFERENCE: own}, window, COARSE_STEPS, factors=PROBES)
+        tracked = runner.run({REFERENCE: None}, window, COARSE_STEPS, factors=PROBES)
         away = ~np.all(np.abs(tracked) <= NEAR * stroke, axis=(0, 2))
         if not away.any():
             break
         window *= max(int(np.argmax(away)), 1) / COARSE_STEPS
         limited_by = "instability"
-    everyone = {REFERENCE: own, **torques}
+    everyone = {REFERENCE: None, **torques}
     errors = np.stack([runner.run(everyone, window, k * COARSE_STEPS, k) for k in HALVINGS], axis=1)
     steps = window / COARSE_STEPS / np.array(HALVINGS)
     labels = _labels(reference)
@@ -231,20 +228,24 @@ class _Runner:
 
     def run(
         self,
-        torques: Mapping[str, TorqueAt],
+        torques: Mapping[str, TorqueAt | None],
         window: float,
         steps: int,
         every: int = 1,
         factors: tuple[float, ...] = (1.0,),
     ) -> FloatArray:
-        """Tracking errors ``(candidates * factors, steps / every, na)``: joint coordinates less those of the motion."""
+        """Tracking errors ``(candidates * factors, steps / every, na)``: joint coordinates less those of the motion.
+
+        Torques None are the reference's own, which closes its loops along the motion.
+        """
         structure = self._reference.structure
         step = window / steps
         model = near_rigid(self._reference.text, step)
-        middle = self._motion_at(_times(self._start + 0.5 * step, step, steps))
+        times = _times(self._start + 0.5 * step, step, steps)
+        middle = self._motion_at(times)
         applied = np.zeros((len(torques) * len(factors), steps, model.nv))
         for i, (name, torque) in enumerate(torques.items()):
-            tau = np.asarray(torque(*middle), dtype=np.float64)
+            tau = self._own(times, middle) if torque is None else np.asarray(torque(*middle), dtype=np.float64)
             if tau.shape != middle[0].shape:
                 raise ArrayError(f'candidate "{name}": expected tau of shape {middle[0].shape}, got {tau.shape}')
             for j, factor in enumerate(factors):
@@ -263,6 +264,9 @@ class _Runner:
         errors: FloatArray = followed - course
         errors[lost] = np.nan
         return errors
+
+    def _own(self, times: FloatArray, middle: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
+        return self._reference.inverse_dynamics(*middle, "distributed", self._force, along=times).tau
 
     def _wrench(self, model: mujoco.MjModel) -> FloatArray:
         """Force and its moment about the platform's mass centre, ``(nbody, 6)``, world frame, at the initial pose."""

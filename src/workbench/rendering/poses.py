@@ -91,5 +91,5 @@ def motion_poses(
         )
     times = start + step * np.arange(int(count) + 1, dtype=np.float64)
     reference = found.robot.reference
-    qpos = reference.inverse_dynamics(*course_of(found)(times)).qpos
+    qpos = reference.inverse_dynamics(*course_of(found)(times), along=times).qpos
     return Poses(reference.text, reference.compiled(), qpos, times, f"{path}, {found.name}")

@@ -24,6 +24,7 @@ CODE = (
     "robots",
     "capabilities",
     "motion",
+    "delimited",
     "reference",
     "campaign",
     "sweep",

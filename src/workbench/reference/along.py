@@ -1,0 +1,172 @@
+"""Samples of a motion, closed along it: each from its predecessor, in the order of time.
+
+A straight line from the home pose to a sample need not pass where the motion passes: around a cusp of the singular
+curve both ends are the same and the assemblies are not. So the samples of a motion are closed in order. In effect; for
+speed all are first closed as scattered samples are, in blocks, and the links between neighbours are looked at: where
+the tangent at one sample leads to the next by the measure that accepts every step of a continuation, the two are what
+following the motion would give. Only where a link is missing the motion is followed sample by sample, until it meets
+what stands already. Nothing of this depends on blocks or threads.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from workbench.arrays import FloatArray
+from workbench.errors import MotionError
+from workbench.reference.continuation import CORRECTION, LONGEST_STEP, NEGLIGIBLE, SMALLEST_STEP, Assembly, Continuation
+from workbench.reference.engine import Evaluator
+from workbench.reference.structure import Structure
+from workbench.reference.tables import BALL
+
+SAME = 1e-6
+"""rad or m: configurations nearer than this are one; at a condition of 1e6 closures differ by 1e-7, and assemblies by
+more wherever the mechanism is not singular."""
+
+BEYOND = 2.0
+"""A joint's change from one sample to the next may be so many times what its rates and accelerations at both account
+for. A jump to another assembly is a hundred times that; a grid that resolves its motion stays below one."""
+
+STILL = 1e-6
+"""rad or m: smaller changes are no jumps, whatever the rates say."""
+
+
+class OrderedClosure(Continuation):
+    """Adds to a continuation from home the closure along a motion, and from given configurations."""
+
+    def close_along(self, q: FloatArray) -> Assembly:
+        """Close actuated coordinates ``(n, na)`` that are a motion, in order; the first is reached from home.
+
+        Raises
+        ------
+        MotionError
+            Naming the first sample that cannot be reached from its predecessor (the first of all: from home).
+        """
+        try:
+            found = self.follow(q)
+        except MotionError:
+            # out of the reach of straight lines from home, but perhaps not of the motion
+            found = self._nothing(len(q), q.shape[1])
+            found.put(np.array([0]), self.follow(q[:1]))
+            missing = np.arange(len(q) - 1)
+        else:
+            missing = np.flatnonzero(~self._linked(found, q))
+        step, here = self._nothing(len(q), q.shape[1]), -1
+        for link in missing:
+            here = max(here, int(link))
+            # from here on follow the motion until it meets what stands already
+            while here + 1 < len(q):
+                one = np.array([here + 1])
+                self._reach(q, one, found, q[here][None, :], np.array([here]), step)
+                met = np.isfinite(found.residual[one]) & (self._apart(step.qpos[one], found.qpos[one]) <= SAME)
+                if met[0]:
+                    break
+                found.put(one, step, one)
+                here += 1
+        return found
+
+    def close_near(self, q: FloatArray, qpos: FloatArray) -> Assembly:
+        """Close actuated coordinates ``(n, na)``, each from a closed configuration ``(n, nq)`` of its own.
+
+        Raises
+        ------
+        MotionError
+            Naming the first sample that cannot be reached.
+        """
+        n, own = len(q), qpos[:, self.structure.actuated_qpos]
+        start, found = self._nothing(n, q.shape[1]), self._nothing(n, q.shape[1])
+
+        def block(evaluator: Evaluator, rows: slice) -> None:
+            names = np.arange(rows.start, rows.stop)
+            start.put(names, self._newton(evaluator, qpos[rows].copy(), own[rows]))
+
+        self.engine.in_blocks(block, n)
+        self._reach(q, np.arange(n), start, own, np.arange(n), found)
+        return found
+
+    def _linked(self, found: Assembly, q: FloatArray) -> np.ndarray:
+        """Which samples lead to their successors, ``(n - 1,)``: one step of a continuation, judged as any other."""
+        rows = np.arange(len(q) - 1)
+        if not len(rows):
+            return np.zeros(0, dtype=np.bool_)
+        moved, predicted = self._predict(found, rows, np.diff(q, axis=0))
+        near = self._apart(predicted, found.qpos[1:]) <= np.maximum(CORRECTION * moved, NEGLIGIBLE)
+        linked = near & (moved <= LONGEST_STEP)
+        again = np.flatnonzero(~linked)
+        if len(again):  # a longer way takes several steps; again all at once, and only compared
+            stepped = self._nothing(len(q), q.shape[1])
+            arrived = self._reach(q, again + 1, found, q[again], again, stepped, SMALLEST_STEP)
+            linked[again] = arrived & (self._apart(stepped.qpos[again + 1], found.qpos[again + 1]) <= SAME)
+        return linked
+
+    def _apart(self, one: FloatArray, other: FloatArray) -> FloatArray:
+        """How far configurations ``(k, nq)`` are apart, ``(k,)``: hinges, slides, and what ball joints carry.
+
+        A rod's spin about its own axis is idle and depends on the way; so ball joints count by where they take joints
+        and loop closures, not by their turns.
+        """
+        kinds, addresses, _ = self.joints
+        scalar = addresses[kinds != BALL]
+        distance: FloatArray = np.sqrt(np.sum((one[:, scalar] - other[:, scalar]) ** 2, axis=1))
+        if (kinds == BALL).any():
+            gap = np.linalg.norm(self._points(one) - self._points(other), axis=2).max(axis=1)
+            distance = np.hypot(distance, gap)
+        return distance
+
+    def _points(self, qpos: FloatArray) -> FloatArray:
+        """Anchors of joints and sites of loops and platform, ``(k, points, 3)``."""
+        sites = _sites(self.structure)
+        points = np.zeros((len(qpos), len(sites) + len(self.joints[0]), 3))
+
+        def block(evaluator: Evaluator, rows: slice) -> None:
+            count = rows.stop - rows.start
+            evaluator.qpos[:count] = qpos[rows]
+            poses = evaluator.place(np.arange(count, dtype=np.int32))
+            points[rows, : len(sites)] = poses.site_xpos[:count, sites]
+            points[rows, len(sites) :] = poses.anchors[:count]
+
+        self.engine.in_blocks(block, len(qpos))
+        return points
+
+
+def _sites(structure: Structure) -> list[int]:
+    blocks = structure.blocks.tolist()
+    joined = {site for block in blocks if block[0] < 2 for site in block[3:5] if site >= 0}
+    return sorted({*joined, structure.platform_site})
+
+
+def refuse_jumps(
+    t: FloatArray, structure: Structure, joints: tuple[np.ndarray, ...], qpos: FloatArray, qvel: FloatArray,
+    qacc: FloatArray,
+) -> None:  # fmt: skip
+    """Refuse neighbours that are farther apart than their rates and the step between them allow.
+
+    Over a step h a joint with speeds v and accelerations a at both ends moves by no more than about
+    h max|v| + h^2 max|a|; `BEYOND` times that is refused. Hinges and slides, actuated ones included, are looked at.
+
+    Raises
+    ------
+    MotionError
+        Naming the sample, the joint, its change and what would be allowed.
+    """
+    kinds, addresses, dofs = joints
+    scalar = np.flatnonzero(kinds != BALL)
+    if len(t) < 2 or not len(scalar):
+        return
+    h = np.diff(t)[:, None]
+    change = np.abs(np.diff(qpos[:, addresses[scalar]], axis=0))
+    speed, rise = (np.abs(array[:, dofs[scalar]]) for array in (qvel, qacc))
+    reach = h * np.maximum(speed[1:], speed[:-1]) + h**2 * np.maximum(rise[1:], rise[:-1])
+    beyond = change > np.maximum(BEYOND * reach, STILL)
+    if beyond.any():
+        sample, column = (int(index) for index in np.argwhere(beyond)[0])
+        joint = structure.dof_names[int(dofs[scalar[column]])]
+        raise MotionError(
+            f"sample {sample + 1}, joint {joint}: jumps by {change[sample, column]:.3g} since t = {t[sample]:.6g} s;"
+            f" its rates there allow {BEYOND * reach[sample, column]:.3g}; q, qd, qdd and t are not one motion, or"
+            " the samples are too few for it",
+            sample=sample + 1,
+            joint=joint,
+            value=float(change[sample, column]),
+            limit=float(BEYOND * reach[sample, column]),
+        )
