@@ -20,6 +20,7 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 computed alone, in a vector register with others, or in another thread. A division by zero is infinite, as in NumPy."""
 
 KERNEL_FILES = (
+    "recorded/kernels.py",
     *(f"robots/asym_2rss_ppap/{name}.py" for name in ("kernel", "friction")),
     *(f"robots/planar_4rprp/{name}.py" for name in ("kernel", "friction")),
     *(f"robots/{name}.py" for name in ("blocks", "sine_cosine")),

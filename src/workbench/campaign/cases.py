@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.campaign.recorded import read_torques, recorded_motion, records_of
+from workbench.campaign.recorded_spec import RecordedMotion, RecordedSpec
 from workbench.campaign.spec import (
     MAX_SAMPLES,
     Campaign,
@@ -34,6 +36,7 @@ from workbench.motion import (
     sine,
     time_grid,
 )
+from workbench.recorded.read import Record
 from workbench.reference.replay import motion_through
 from workbench.robots.assignments import resolve_changes
 from workbench.robots.catalogue import bundled_robot, bundled_robots
@@ -54,6 +57,8 @@ class Case:
     xd: FloatArray = field(repr=False)
     xdd: FloatArray = field(repr=False)
     """the platform's motion in task coordinates, ``(n, m)``, by closed form where there is one"""
+    records: tuple[tuple[RecordedSpec, Record], ...] = field(default=(), repr=False)
+    """torques from elsewhere"""
 
     @property
     def name(self) -> str:
@@ -118,7 +123,12 @@ def resolve_cases(
                 overrides = table.layered(overrides, resolve_changes(table, before.values, relative))
             robot = robot_once(overrides)
             _check_candidates(campaign, robot)
-            cases.append(_resolve(spec, file, path, overrides, robot))
+            case = _resolve(spec, file, path, overrides, robot)
+            records = tuple(
+                (one, read_torques(one, locate(file, one.file, "recorded.file"), robot))
+                for one in records_of(campaign.recorded, spec.name, names, str(file))
+            )
+            cases.append(replace(case, records=records))
         except WorkbenchError as error:
             raise _in_case(error, file, spec.name) from error
     return cases
@@ -234,6 +244,10 @@ def _check_candidates(campaign: Campaign, robot: Robot) -> None:
             if failing not in robot.joints:
                 hint = did_you_mean(failing, robot.joints)
                 raise SpecError(f'candidate "{candidate.name}": expect_fail: no joint "{shorten(failing)}"{hint}')
+    for record in campaign.recorded:
+        if record.reference not in robot.mass_models:
+            hint = did_you_mean(record.reference, robot.mass_models)
+            raise SpecError(f'recorded "{record.label}": no reference "{record.reference}"{hint}')
     for figure in campaign.figure:
         if (figure.kind == "torque" or figure.joint) and figure.joint not in robot.joints:
             hint = did_you_mean(str(figure.joint), robot.joints)
@@ -299,6 +313,8 @@ def plan_motion(spec: CaseSpec, file: Path, robot: Robot) -> JointMotion | Platf
         Another number of joints than the mechanism has.
     """
     motion = spec.motion
+    if isinstance(motion, RecordedMotion):
+        return recorded_motion(motion, locate(file, motion.file, "motion.file"), robot)
     if isinstance(motion, CsvMotion):
         place = locate(file, motion.file, "motion.file")
         return judged(read_joints(place, robot.joints, units=robot.coordinate_units))

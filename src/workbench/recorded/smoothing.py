@@ -16,7 +16,7 @@ from workbench.arrays import FloatArray
 from workbench.errors import MotionError
 from workbench.recorded.kernels import backward, covariances, forward
 
-ORDERS = (3, 4, 5, 6)
+ORDERS = (4, 5, 6)
 """Orders m that are tried: the spline has degree 2 m - 1."""
 
 FEWEST = 2 * max(ORDERS)
@@ -47,6 +47,19 @@ class Smoothed:
     order: int
     _factors: FloatArray = field(repr=False)
     _step: float = field(repr=False)
+    _rho: float = 0.0
+    _dt: FloatArray | None = field(default=None, repr=False)
+
+    def quieter(self, times: float) -> float:
+        """Uncertainty of the acceleration with noise so many times smaller, over what it is now (median)."""
+        if self._dt is None:
+            return 1.0
+        n, m, _ = self._factors.shape
+        factors, found = np.empty_like(self._factors), np.empty((n, 3, 3))
+        forward(np.zeros(n), self._dt, *_unit_step(m), self._rho * times**2, factors, True)
+        covariances(factors, found)
+        now = np.median(self.covariance[:, 2, 2]) * self._step**4 / self.sigma**2
+        return float(np.sqrt(np.median(found[:, 2, 2]) / now) / times)
 
     def draws(self, count: int, seed: int) -> FloatArray:
         """Errors of (q, qd, qdd) as they may be, ``(count, n, 3)``: draws from the posterior, less its mean."""
@@ -115,6 +128,8 @@ def smooth(t: FloatArray, y: FloatArray, floor: float = 0.0) -> Smoothed:
         best.order,
         factors,
         step,
+        best.rho,
+        dt,
     )
 
 

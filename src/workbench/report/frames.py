@@ -20,7 +20,7 @@ from workbench.report.manifest import Manifest
 RATES = {"": "", "d": "/s", "dd": "/s^2"}
 """what a derivative's unit adds to the coordinate's"""
 
-TORQUES = ("ref", "cand")
+TORQUES = ("ref", "cand", "rec", "band")
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class RunFrames:
     def torques(self, case: str) -> pd.DataFrame:
         """Torques of one case, tidy: one row per sample, joint and curve.
 
-        Columns ``t``, ``joint``, ``kind`` (``ref`` or ``cand``), ``name`` (mass model or candidate), ``value``.
+        Columns ``t``, ``joint``, ``kind`` (``ref``, ``cand`` or ``rec``), ``name`` (mass model or candidate), ``value``.
 
         Raises
         ------
