@@ -267,9 +267,10 @@ def _reason(
 ) -> str:
     """Why a joint is judged as it is, in one line."""
     left = f"motion and recorder leave {_percent(relative)} of its peak open"
-    if not isinstance(motion, EstimatedMotion):
-        way = ""
-    else:
+    way = ""
+    if open_.noise_peak[i] > 0.7 * open_.peak[i]:
+        left += " (the noise of the recorded torques themselves; the parts below are averages and know more)"
+    elif isinstance(motion, EstimatedMotion):
         way = _way(motion, spec.bound or FINE, relative)
         worst = max(range(len(motion.smoothed)), key=lambda j: float(np.median(motion.smoothed[j].covariance[:, 2, 2])))
         one, written = motion.smoothed[worst], motion.written[worst]

@@ -39,6 +39,8 @@ class Uncertainty:
     """``(na,)``: so many standard deviations hold the whole curve in `LEVEL` of cases"""
     peak: FloatArray
     """``(na,)``: the largest difference that they leave over the case stays below this in `LEVEL` of cases"""
+    noise_peak: FloatArray
+    """``(na,)``: the same of the recorded torques' own noise and times alone, without the motion's part"""
     draws: FloatArray = field(repr=False)
     """``(count, n, na)`` differences as they may be"""
 
@@ -75,6 +77,7 @@ def uncertainty(
     generator = np.random.default_rng(SEED)
     draws = generator.standard_normal((count, n, na)) * noise
     draws += generator.standard_normal((count, 1, na)) * drift
+    alone = np.quantile(np.abs(draws).max(axis=1), LEVEL, axis=0)
     variance = np.tile(noise**2, (n, 1)) + drift**2
     if smoothed:
         slopes = sensitivities(torque, motion)
@@ -88,6 +91,7 @@ def uncertainty(
         sigma,
         np.quantile(over.max(axis=1), LEVEL, axis=0),
         np.quantile(np.abs(draws).max(axis=1), LEVEL, axis=0),
+        alone,
         draws,
     )
 

@@ -121,9 +121,9 @@ def split(
                 tried.append((rest, name, value, error))
         if not tried:
             break
-        # the first within a hundredth of the best: the simpler explanation
+        # the first within a tenth of the best: the simpler explanation
         least = min(rest for rest, *_ in tried)
-        rest, name, value, error = next(one for one in tried if one[0] <= least + 0.01 * (left - least))
+        rest, name, value, error = next(one for one in tried if one[0] <= least + 0.1 * (left - least))
         if left - rest < WORTH * left:
             break
         chosen.append(name)

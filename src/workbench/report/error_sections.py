@@ -51,9 +51,8 @@ def claims_section(run: Run) -> Section | None:
 
 def worst_section(run: Run, anchors: Mapping[str, str]) -> Section:
     """Show the worst verification rows, then declared failures and modelling errors of all cases, largest first."""
-    checked = [
-        row for row in run.rows if row.kind == "verification" or (row.verdict in FAILURES and row.kind != "recorded")
-    ]
+    own = [row for row in run.rows if row.kind != "recorded"]
+    checked = [row for row in own if row.kind == "verification" or row.verdict in FAILURES]
     checked.sort(key=lambda row: (row.verdict not in FAILURES, -row.badness))
     tables = [
         _worst_table(run, checked, anchors),

@@ -55,7 +55,7 @@ class RunFrames:
     def torques(self, case: str) -> pd.DataFrame:
         """Torques of one case, tidy: one row per sample, joint and curve.
 
-        Columns ``t``, ``joint``, ``kind`` (``ref``, ``cand`` or ``rec``), ``name`` (mass model or candidate), ``value``.
+        Columns ``t``, ``joint``, ``kind`` (``ref``, ``cand``, ``rec``), ``name`` (mass model or candidate), ``value``.
 
         Raises
         ------
