@@ -172,7 +172,8 @@ def load_candidates(names: Iterable[str | Path]) -> tuple[UserCandidate, ...]:
     Parameters
     ----------
     names
-        Paths of ``.py`` files, or names of entry points of the group `GROUP`.
+        Paths of files, ``.py`` or in another language (docs/languages.md), or names of entry points of the group
+        `GROUP`.
 
     Raises
     ------
@@ -180,8 +181,13 @@ def load_candidates(names: Iterable[str | Path]) -> tuple[UserCandidate, ...]:
         No such file or entry point; the file does not run (with its own line); nothing is registered in it; a name
         that stands twice.
     """
+    from workbench.campaign.foreign_candidates import is_foreign, load_foreign
+
     found: list[UserCandidate] = []
     for name in names:
+        if is_foreign(Path(name)):
+            found.append(load_foreign(Path(name)))
+            continue
         module = _module(str(name))
         registered = [
             UserCandidate(value, getattr(value, MARK))
@@ -218,7 +224,9 @@ def _module(name: str) -> ModuleType:
             file=name,
         )
     if path.suffix != ".py":
-        raise SpecError(f"{name}: candidates stand in a Python file, its name ends in .py", file=name)
+        raise SpecError(
+            f"{name}: candidates stand in a file .py, .m, .c, .so, .jl, .R or in a program that can be run", file=name
+        )
     loader = _Uncached(f"workbench_candidates_{path.stem}", str(path.resolve()))
     spec = importlib.util.spec_from_loader(loader.name, loader)
     assert spec is not None
