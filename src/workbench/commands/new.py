@@ -113,18 +113,39 @@ def test_{function}(tmp_path):
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
 
 
+def _number(loops: str) -> int:
+    if not loops.isdigit() or not 1 <= int(loops) <= 20:
+        raise SpecError(f"--loops {loops}; allowed: 1 to 20, or with --from a table of loops")
+    return int(loops)
+
+
 def new(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory to make; its name names the files.")],
     actuated: Annotated[
         list[str] | None, typer.Option(metavar="JOINT", help="A driven joint; may be repeated. Default: crank.")
     ] = None,
     loops: Annotated[
-        int | None, typer.Option(min=1, max=20, help="Closed loops, one driven joint each. Default: one a joint.")
+        str | None,
+        typer.Option(
+            metavar="NUMBER|FILE",
+            help="Closed loops of the sketch, one driven joint each (default: one a joint); with --from, their table.",
+        ),
+    ] = None,
+    source: Annotated[
+        Path | None, typer.Option("--from", metavar="FILE", help="A robot's URDF, in place of a sketch.")
     ] = None,
 ) -> None:
-    """Write a model with closed loops, its campaign, a formula to fill in and a test; they run at once."""
+    """Write a model with closed loops, its campaign, a formula to fill in and a test; they run at once.
+
+    With --from, the robot is a URDF's, and --loops names the table of its loops (.toml, .yaml).
+    """
+    if source is not None:
+        from workbench.commands.from_urdf import from_urdf
+
+        from_urdf(source, directory, Path(loops) if loops else None, tuple(actuated or ()))
+        return
     joints = tuple(actuated or ["crank"])
-    count = loops or len(joints)
+    count = _number(loops) if loops else len(joints)
     name = directory.name
     for what, value in (("DIR", name), *(("--actuated", joint) for joint in joints)):
         if not NAME.fullmatch(value):
