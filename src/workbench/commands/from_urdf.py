@@ -63,6 +63,8 @@ def _robot(name: str, found: Imported, driven: tuple[str, ...]) -> str:
         "# the site whose motion is recorded; another one may be meant",
         f'platform = {{ site = "{found.sites[0]}" }}',
     ]
+    if found.limited:
+        lines += ["# joints' ranges stand in the model; inverse dynamics does not stop at them", 'ignore = ["limits"]']
     return "\n".join(lines) + "\n"
 
 
@@ -70,7 +72,10 @@ def _campaign(model: Path, name: str, found: Imported, driven: tuple[str, ...]) 
     """A campaign with a small motion that the robot can follow, where one is found."""
     lines = ["format = 1", f"name = {json.dumps(name)}", f"title = {json.dumps(name)}", 'robot = "robot.toml"', ""]
     try:
-        reference = MujocoReference(model, setup=Setup(actuated=driven, platform_site=found.sites[0]))
+        reference = MujocoReference(
+            model,
+            setup=Setup(actuated=driven, platform_site=found.sites[0], ignore=("limits",) if found.limited else ()),
+        )
         home, amplitude = reference.home, _amplitude(reference)
     except WorkbenchError as error:
         typer.echo(f"no motion was found: {error}")

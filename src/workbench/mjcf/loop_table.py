@@ -92,11 +92,11 @@ def read_loops(path: Path) -> LoopTable:
     for pair, axes in zip(found.closed_loop, freed, strict=True):
         if len(axes) == 2:
             raise ModelError(
-                f"{path}: loop {pair[0]}, {pair[1]}: {axes[0]} and {axes[1]} freed, as in a universal joint; allowed: none,"
+                f"{path}: loop {pair[0]}, {pair[1]}: {axes[0]} and {axes[1]} freed, a universal joint; allowed: none,"
                 " one or all three turns (put a link of its own between two hinges)",
                 file=str(path),
             )
-    loops = tuple(Loop(*pair, axes) for pair, axes in zip(found.closed_loop, freed, strict=True))
+    loops = tuple(Loop(pair[0], pair[1], axes) for pair, axes in zip(found.closed_loop, freed, strict=True))
     changed = tuple(zip(found.joint_name, found.joint_type, strict=True))
     return LoopTable(loops, tuple(found.name_mot), changed)
 

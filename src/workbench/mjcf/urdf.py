@@ -40,6 +40,8 @@ class Imported:
     """at the frames of the loops"""
     lost: tuple[str, ...]
     """what the MJCF does not hold, one line each"""
+    limited: bool
+    """whether joints have ranges; the MJCF keeps them"""
 
 
 def import_urdf(text: str, file: str, table: LoopTable) -> Imported:
@@ -87,11 +89,12 @@ def import_urdf(text: str, file: str, table: LoopTable) -> Imported:
     joints = tuple(
         model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] >= mujoco.mjtJoint.mjJNT_SLIDE.value
     )
-    for joint in table.actuated:
-        if joint not in joints:
-            raise ModelError(f'{file}: name_mot: no hinge or slide "{joint}"{did_you_mean(joint, joints)}', file=file)
+    for driven in table.actuated:
+        if driven not in joints:
+            raise ModelError(f'{file}: name_mot: no hinge or slide "{driven}"{did_you_mean(driven, joints)}', file=file)
+    limited = bool(model.jnt_limited.any())
     sites = tuple(f"loop{k + 1}_{side}" for k in range(len(table.loops)) for side in "ab")
-    return Imported(written, table.actuated, joints, sites, lost)
+    return Imported(written, table.actuated, joints, sites, lost, limited)
 
 
 def _parsed(text: str, file: str) -> ET.Element:

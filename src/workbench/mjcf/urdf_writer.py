@@ -16,7 +16,7 @@ HINGE_ARM = 0.1
 """m: a hinge as two points that meet, so far apart along its axis."""
 
 ROUND_TRIP = 1e-9
-"""kg, m, kg m^2 and of rotation matrices: masses, mass centres, inertias, poses and axes of both files agree to this."""
+"""kg, m, kg m^2 and of rotation matrices: masses, mass centres, inertias, poses, axes of both files agree to this."""
 
 Pose = tuple[FloatArray, FloatArray]
 """position ``(3,)`` and rotation ``(3, 3)``"""
