@@ -38,6 +38,9 @@ class Formula(Protocol):
     ) -> FloatArray:
         """Torques ``(n, na)`` from q, qd, qdd and the external force."""
 
+    def ready(self, parameters: Mapping[str, float]) -> None:
+        """Start what takes longer than a formula."""
+
 
 class ForeignCandidate(UserCandidate):
     """A formula in another language, judged on what it returns."""
@@ -57,8 +60,9 @@ class ForeignCandidate(UserCandidate):
         CandidateError
             It failed, took too long, or returned something that is no finite array ``(n, na)``; with file and line.
         """
-        begun = time.perf_counter()
         try:
+            self._formula.ready(robot.values)
+            begun = time.perf_counter()
             found = self._formula(robot.values, (q, qd, qdd, force), robot.joints, LIMIT_S)
         except ForeignError as fault:
             where = f"{self.file.name}:{fault.line or self.line}" if fault.line or self.line else self.file.name

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from workbench.commands.language_templates import LANGUAGES
 from workbench.errors import OutputError, SpecError
 
 MODEL = """<mujoco model="{name}">
@@ -131,6 +132,10 @@ def new(
             help="Closed loops of the sketch, one driven joint each (default: one a joint); with --from, their table.",
         ),
     ] = None,
+    language: Annotated[
+        str | None,
+        typer.Option(metavar="octave|c|julia|program", help="The formula in this language too. Default: Python alone."),
+    ] = None,
     source: Annotated[
         Path | None, typer.Option("--from", metavar="FILE", help="A robot's URDF, in place of a sketch.")
     ] = None,
@@ -144,6 +149,8 @@ def new(
 
         from_urdf(source, directory, Path(loops) if loops else None, tuple(actuated or ()))
         return
+    if language is not None and language not in LANGUAGES:
+        raise SpecError(f"--language {language}; allowed: {', '.join(LANGUAGES)}")
     joints = tuple(actuated or ["crank"])
     count = _number(loops) if loops else len(joints)
     name = directory.name
@@ -182,3 +189,10 @@ def new(
         (directory / file).write_text(text.format(**fields), encoding="utf-8")
     typer.echo(f"{directory}: {name}.xml, {name}.toml, {name}.py, test_{name}.py; now\n  cd {directory}")
     typer.echo(f"  workbench run {name}.toml --candidates {name}.py")
+    if language is not None:
+        pattern, text = LANGUAGES[language]
+        file = pattern.format(name=name)
+        (directory / file).write_text(text.format(**fields), encoding="utf-8")
+        if language == "program":
+            (directory / file).chmod(0o755)
+        typer.echo(f"  workbench run {name}.toml --candidates {'./' if language == 'program' else ''}{file}")

@@ -78,8 +78,7 @@ class CFormula:
             It asks for a parameter that the robot has not, returns an error, crashes (with its line where the compiler
             kept it), or takes too long.
         """
-        if self._server is None or not self._server.running:
-            self.start()
+        self.ready(parameters)
         assert self._server is not None
         for name in self._wanted:
             if name not in parameters:
@@ -93,6 +92,11 @@ class CFormula:
         if answer != "ok":
             raise ForeignError(answer.removeprefix("error "))
         return read_reply(scratch)
+
+    def ready(self, parameters: Mapping[str, float]) -> None:
+        """See that the process runs."""
+        if self._server is None or not self._server.running:
+            self.start()
 
     def start(self) -> None:
         """Start the process that calls it.

@@ -109,13 +109,18 @@ class OctaveFormula:
             It failed, with its line; or took too long.
         """
         scratch = Path(self._folder.name)
-        if self._server is None or not self._server.running or tuple(parameters) != self._names:
-            self.start(tuple(parameters))
+        self.ready(parameters)
         assert self._server is not None
         write_request(scratch, list(parameters.values()), arrays)
         if self._server.ask(seconds) == "ok":
             return read_reply(scratch)
         raise self._fault((scratch / ERROR).read_text(encoding="utf-8", errors="replace"))
+
+    def ready(self, parameters: Mapping[str, float]) -> None:
+        """See that Octave runs and knows the parameters' names."""
+        if self._server is None or not self._server.running or tuple(parameters) != self._names:
+            self.close()
+            self.start(tuple(parameters))
 
     def start(self, names: tuple[str, ...]) -> None:
         """Start Octave, which takes longer than a formula."""

@@ -74,6 +74,9 @@ class ProgramFormula:
         found: FloatArray = table.values[:, [table.names.index(name) for name in wanted]]
         return found
 
+    def ready(self, parameters: Mapping[str, float]) -> None:
+        """A program starts with each call."""
+
     def close(self) -> None:
         """Nothing runs between calls."""
 
