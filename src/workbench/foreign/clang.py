@@ -16,7 +16,7 @@ from pathlib import Path
 from workbench.arrays import FloatArray
 from workbench.errors import SpecError, did_you_mean
 from workbench.foreign.fault import ForeignError
-from workbench.foreign.served import Served, read_reply, scratch_directory, write_request
+from workbench.foreign.served import Scratch, Served, read_reply, write_request
 
 COMPILERS = ("cc", "gcc", "clang")
 COMPILE_S = 60.0
@@ -55,7 +55,7 @@ class CFormula:
 
     def __init__(self, path: Path) -> None:
         self.path = path.resolve()
-        self._folder = scratch_directory()
+        self._folder = Scratch()
         self._server: Served | None = None
         self._wanted: tuple[str, ...] = ()
         self._force = False

@@ -10,7 +10,7 @@ from pathlib import Path
 from workbench.arrays import FloatArray
 from workbench.errors import SpecError
 from workbench.foreign.fault import ForeignError
-from workbench.foreign.served import ERROR, MARK, REPLY, REQUEST, Served, read_reply, scratch_directory, write_request
+from workbench.foreign.served import ERROR, MARK, REPLY, REQUEST, Scratch, Served, read_reply, write_request
 
 PROGRAMS = ("octave-cli", "octave")
 START_S = 60.0
@@ -96,7 +96,7 @@ class OctaveFormula:
         self._program = program
         self._server: Served | None = None
         self._names: tuple[str, ...] = ()
-        self._folder = scratch_directory()
+        self._folder = Scratch()
 
     def __call__(
         self, parameters: Mapping[str, float], arrays: tuple[FloatArray, ...], joints: tuple[str, ...], seconds: float

@@ -17,7 +17,7 @@ from workbench.arrays import FloatArray
 from workbench.delimited import read_table
 from workbench.errors import CandidateError, SpecError
 from workbench.foreign.fault import ForeignError
-from workbench.foreign.served import MOST_ERROR, scratch_directory
+from workbench.foreign.served import MOST_ERROR, Scratch
 
 INTERPRETERS = {".jl": ("julia", "--startup-file=no"), ".R": ("Rscript", "--vanilla"), ".r": ("Rscript", "--vanilla")}
 FORMAT = 1
@@ -33,7 +33,7 @@ class ProgramFormula:
 
     def __init__(self, path: Path) -> None:
         self.path = path.resolve()
-        self._folder = scratch_directory()
+        self._folder = Scratch()
         self._command = [str(self.path)]
         if path.suffix in INTERPRETERS:
             name, *options = INTERPRETERS[path.suffix]
@@ -102,6 +102,6 @@ class ProgramFormula:
             text = complaints.decode("utf-8", errors="replace")[-MOST_ERROR:]
             lines = [line for line in text.splitlines() if line.strip()]
             place = re.findall(rf"{re.escape(self.path.name)}\D{{1,9}}(\d+)", text)
-            said = next((line for line in lines if "rror" in line), lines[-1] if lines else "")
+            said = next((line for line in reversed(lines) if "rror" in line), lines[-1] if lines else "")
             what = f"ended with exit code {process.returncode}{': ' if said else ''}{said.strip()}"
             raise ForeignError(what, int(place[-1]) if place else None)

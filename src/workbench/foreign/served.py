@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import queue
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -132,9 +133,12 @@ def _pump(stream: IO[str], lines: queue.Queue[str | None]) -> None:
     lines.put(None)
 
 
-def scratch_directory() -> tempfile.TemporaryDirectory[str]:
-    """A private directory that goes with the object."""
-    return tempfile.TemporaryDirectory(prefix="workbench-formula-", ignore_cleanup_errors=True)
+class Scratch:
+    """A private directory that goes with the object, or at the end of the process."""
+
+    def __init__(self) -> None:
+        self.name = tempfile.mkdtemp(prefix="workbench-formula-")
+        self._finalizer = weakref.finalize(self, shutil.rmtree, self.name, ignore_errors=True)
 
 
 def write_request(scratch: Path, parameters: Sequence[float], arrays: Sequence[FloatArray]) -> None:
