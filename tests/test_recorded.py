@@ -88,7 +88,7 @@ def test_few_digits_are_no_false_alarm_and_all_digits_find_what_was_planted(tmp_
 
 
 def test_a_scale_is_found_through_noise_and_a_bound_is_judged(tmp_path: Path) -> None:
-    bound = "bound = 0.05\n"
+    bound = "bound = 0.08\n"
     run = run_campaign(written(tmp_path, None, bound, factor=1.02, noise=0.005), tmp_path / "run")
     (row,) = [row for row in run.rows if row.kind == "recorded"]
     assert row.verdict == "pass"
