@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 import workbench as wb
+from workbench.campaign.evidence import Effort
 from workbench.campaign.foreign_candidates import ForeignCandidate
+from workbench.campaign.run import run_campaign
 from workbench.campaign.user_candidates import load_candidates
 from workbench.errors import CandidateError, SpecError
 from workbench.foreign.octave import octave_program
@@ -73,6 +75,19 @@ def test_the_papers_formulas_give_what_the_closed_forms_give(
     assert mistake in text
     spoiled.write_text(text.replace(mistake, mistake.replace("-", "+")), encoding="utf-8")
     assert np.abs(loaded(spoiled)(robot, q, qd, qdd, force) - wanted).max() > 1e-3 * np.abs(wanted).max()
+
+
+@both
+def test_a_campaign_shows_the_same_table_for_every_language(suffix: str, repository: Path, tmp_path: Path) -> None:
+    folder = repository / "examples" / "languages"
+    files = [folder / "rrr.py", folder / f"rrr.{suffix}"]
+    run = run_campaign(folder / "rrr.toml", tmp_path / "run", candidates=files, effort=Effort(budget=False))
+    assert run.passed
+    errors = {name: [r.peak_error for r in run.rows if r.candidate == name] for name in {r.candidate for r in run.rows}}
+    python = errors.pop("rrr-python")
+    (other,) = errors.values()
+    assert len(python) == len(other) == 3
+    assert np.abs(np.subtract(python, other)).max() < CLOSE
 
 
 @needs_octave

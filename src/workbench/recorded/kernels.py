@@ -1,6 +1,6 @@
 """Square-root information smoother of one coordinate: the smoothing spline as least squares, with its uncertainty.
 
-The coordinate is an m-fold integrated Wiener process seen through noise (Wahba 1978, see docs/recorded.md): between
+The coordinate is an m-fold integrated Wiener process seen through noise ([Wahba1983], see docs/recorded.md): between
 samples its m-th derivative is white noise of density ``rho``, in units of the measurement's variance. Each sample adds
 a row, each step m rows, and orthogonal transformations keep the factor triangular, so that nothing is squared and no
 prior is needed. Time is counted in units of the mean step; state k is (q, q', ..., q^(m-1)).

@@ -1,7 +1,7 @@
 """Position, velocity and acceleration of sampled coordinates, and how uncertain rounding and noise leave them.
 
 A smoothing spline whose order and bandwidth are those under which the samples are most likely (restricted maximum
-likelihood); its posterior covariance is the uncertainty (Wahba 1983). Samples that carry no noise leave nothing to
+likelihood); its posterior covariance is the uncertainty [Wahba1983]. Samples that carry no noise leave nothing to
 smooth: the spline then runs through them.
 """
 
