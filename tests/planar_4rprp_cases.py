@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from workbench.capabilities.robot import load_robot as load_mechanism
-from workbench.robots.planar_4rprp.closed_form import Planar4Rprp
 
 MODEL = str(Path(__file__).resolve().parents[1] / "models" / "planar_4rprp.xml")
 HOME = np.array([0.3893182978, 0.3768866111, 0.3893182978])
@@ -32,7 +32,7 @@ def example(samples: int = 401, speed: float = 1.0) -> Motion:
     return HOME + AMPLITUDE * sine, speed * AMPLITUDE * cosine, -(speed**2) * AMPLITUDE * sine
 
 
-def scattered(mechanism: Planar4Rprp, samples: int, seed: int) -> Motion:
+def scattered(mechanism: Any, samples: int, seed: int) -> Motion:
     """Poses all over the workspace with velocities and accelerations that have nothing to do with each other."""
     rng = np.random.default_rng(seed)
     p = mechanism.parameters
@@ -42,7 +42,7 @@ def scattered(mechanism: Planar4Rprp, samples: int, seed: int) -> Motion:
     return q, rng.normal(size=q.shape), 30 * rng.normal(size=q.shape)
 
 
-def slow(mechanism: Planar4Rprp, samples: int, seed: int) -> Motion:
+def slow(mechanism: Any, samples: int, seed: int) -> Motion:
     """As `scattered`, slow enough for finite differences over a few milliseconds."""
     q, qd, qdd = scattered(mechanism, samples, seed)
     return q, 0.2 * qd, 0.1 * qdd

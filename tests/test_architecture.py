@@ -23,6 +23,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("report", "compare", "rendering"),
     ("sweep",),
     ("campaign", "workspace"),
+    ("capabilities",),
     ("recorded",),
     ("reference",),
     ("robots",),
@@ -47,11 +48,14 @@ LAYERS: tuple[tuple[str, ...], ...] = (
 )
 """Top to bottom; a module may import its own layer and those below. The package's own __init__ may import any."""
 
-ENGINE_LAYERS = ("mjcf", "robots", "reference", "rendering")
+ENGINE_LAYERS = ("mjcf", "robots", "reference", "capabilities", "rendering")
 """The only places that may import mujoco; rendering, since MuJoCo draws the models."""
 
-CLOSED_FORMS = ("workbench.robots.asym_2rss_ppap", "workbench.robots.planar_4rprp")
-"""Packages of formulas: they know neither the engine nor files, and the reference does not know them."""
+CLOSED_FORMS = tuple(
+    f"{PACKAGE}.robots.{path.parent.name}"
+    for path in sorted((Path(__file__).resolve().parents[1] / "src" / PACKAGE / "robots").glob("*/robot.toml"))
+)
+"""Folders of robots: their formulas know neither the engine nor files, and nothing above knows one by name."""
 
 HEAVY = ("mujoco", "numba", "pandas", "matplotlib", "scipy", "pinocchio")
 """What `import workbench` must not load."""
@@ -115,12 +119,16 @@ def findings_of_import(importer: str, imported: str) -> Iterator[str]:
     own, other = rank(layer), rank(target)
     if own is not None and other is not None and other < own:
         yield f"imports {imported}, a layer above"
-    if layer == "reference" and is_closed_form(imported):
-        yield f"imports {imported}; the reference must not know a closed form"
     if is_closed_form(importer) and target == "mjcf":
         yield f"imports {imported}; a closed form knows no file"
     if layer == "report" and target == "reference":
         yield f"imports {imported}; a report reads stored results only"
+
+
+def robots_named(path: Path) -> Iterator[tuple[int, str]]:
+    """Lines that hold the name of a robot that comes with the package."""
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+        yield from ((number, name) for form in CLOSED_FORMS if (name := form.rpartition(".")[2]) in line)
 
 
 def findings(root: Path) -> list[str]:
@@ -136,6 +144,8 @@ def findings(root: Path) -> list[str]:
         lines = len(path.read_text(encoding="utf-8").splitlines())
         if lines > MAX_LINES:
             found.append(f"{where}:{lines} more than {MAX_LINES} lines")
+        if not is_closed_form(module_name(path, root)) and layer is not None:
+            found += [f"{where}:{line} knows the robot {name} by name" for line, name in robots_named(path)]
         for line, imported in imported_modules(path, root):
             found += [f"{where}:{line} {text}" for text in findings_of_import(module_name(path, root), imported)]
     return found
@@ -152,7 +162,7 @@ CLEAN = {
     "cli.py": "from workbench.report import build",
     "report/__init__.py": "from workbench.campaign import store\nfrom . import figures",
     "report/figures.py": "import matplotlib",
-    "campaign/__init__.py": "from workbench.reference import load\nfrom workbench.robots.planar_4rprp import closed",
+    "campaign/__init__.py": "from workbench.reference import load\nfrom workbench.robots import load",
     "campaign/store.py": "import json",
     "reference/__init__.py": "import mujoco\nfrom workbench import mjcf\nfrom workbench.robots import base",
     "mjcf/text.py": "from mujoco import MjModel",
@@ -179,8 +189,7 @@ PLANTED = {
     "a closed form imports the text of a model": (CLOSED, "import workbench.mjcf.text", "knows no file"),
     "mjcf knows a robot": ("mjcf/text.py", "from workbench.robots import base", "a layer above"),
     "a closed form imports the reference": (CLOSED, "from workbench.reference import load", "a layer above"),
-    "the reference knows a mechanism": (REFERENCE, "from workbench.robots.planar_4rprp.closed import X", "closed form"),
-    "the reference knows one by its package": (REFERENCE, "from workbench.robots import planar_4rprp", "closed form"),
+    "a campaign tells robots apart": ("campaign/store.py", "if name == 'planar_4rprp': pass", "by name"),
     "a report imports the reference": ("report/figures.py", "from workbench.reference import load", "stored results"),
     "a report imports mujoco": ("report/figures.py", "import mujoco", "imports mujoco"),
     "a campaign imports mujoco": ("campaign/store.py", "from mujoco import mj_step", "imports mujoco"),

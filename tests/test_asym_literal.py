@@ -19,7 +19,8 @@ from workbench.metrics import relative_error
 from workbench.robots.asym_2rss_ppap import literal
 from workbench.robots.asym_2rss_ppap.closed_form import Asym2rssPpap
 from workbench.robots.asym_2rss_ppap.literal import Misprint
-from workbench.robots.asym_2rss_ppap.parameters import Parameters
+from workbench.robots.catalogue import bundled_robot
+from workbench.robots.parameter_set import parameter_type
 
 STEP = 5e-4  # of the eighth-order differences: poses within 0.03 of the workspace boundary allow no larger one
 ORACLE_TOLERANCE = 1e-9  # relative to the joint's peak: what those differences leave, with a margin
@@ -40,7 +41,16 @@ SEEN_BY = {
 }
 
 
-def table_1() -> Parameters:
+TABLE = bundled_robot("asym_2rss_ppap").table
+
+
+def Parameters(**values: float) -> Any:
+    """Parameters of the robot by name; friction is none unless it is given."""
+    unset = {name: 0.0 for name in TABLE.infos if name.startswith(("damping", "coulomb", "armature"))}
+    return parameter_type(tuple(TABLE.infos), tuple(TABLE.groups.items()))(**unset | values)
+
+
+def table_1() -> Any:
     one_limb = {"L": 0.2, "l": 0.1, "a1": 0.2, "a2": 0.3, "m1": 0.2, "m2": 0.3, "k1": 0.5, "k2": 0.5}
     one_limb |= {"I1": 0.2 * 0.2**2 / 12, "I2": 0.3 * 0.3**2 / 12}
     sided = {f"{name}_{side}": value for name, value in one_limb.items() for side in ("left", "right")}
@@ -50,7 +60,7 @@ def table_1() -> Parameters:
     )  # fmt: skip
 
 
-def random_robot(seed: int) -> Parameters:
+def random_robot(seed: int) -> Any:
     """A robot whose limbs differ, with mass centres off the middle and a payload."""
     rng = np.random.default_rng(seed)
     values = {name: value * rng.uniform(0.9, 1.1) for name, value in dataclasses.asdict(table_1()).items()}
@@ -83,7 +93,7 @@ SIMULATION_1 = paper_motion((2, 5, 5), 5.0)
 SIMULATION_2 = paper_motion((10, 25, 35), 1.0)
 
 
-def platform(p: Parameters, q: np.ndarray) -> np.ndarray:
+def platform(p: Any, q: np.ndarray) -> np.ndarray:
     """Lower intersection of the two circles about the arms' tips; analytic, so complex q are welcome."""
     left = np.stack([-(p.L_left - p.l_left) - p.a1_left * np.cos(q[:, 1]), p.a1_left * np.sin(q[:, 1])], axis=1)
     right = np.stack([p.L_right - p.l_right + p.a1_right * np.cos(q[:, 2]), p.a1_right * np.sin(q[:, 2])], axis=1)
@@ -97,7 +107,7 @@ def platform(p: Parameters, q: np.ndarray) -> np.ndarray:
     return np.stack([q[:, 0], x2, x3], axis=1)
 
 
-def point_masses(p: Parameters, q: np.ndarray, bar_inertia: float) -> list[tuple[float, np.ndarray]]:
+def point_masses(p: Any, q: np.ndarray, bar_inertia: float) -> list[tuple[float, np.ndarray]]:
     """Every body as (mass, positions (n, 3)); a bar is two masses, apart by twice its radius of gyration."""
     zero = np.zeros_like(q[:, 0])
     x = platform(p, q)
@@ -135,7 +145,7 @@ def differences(function: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> 
     )
 
 
-def mass_matrix(p: Parameters, q: np.ndarray, bar_inertia: float) -> np.ndarray:
+def mass_matrix(p: Any, q: np.ndarray, bar_inertia: float) -> np.ndarray:
     total = np.zeros((len(q), 3, 3))
     for index, (mass, _) in enumerate(point_masses(p, q, bar_inertia)):
         moved = gradients(lambda z, index=index: point_masses(p, z, bar_inertia)[index][1], q)
@@ -143,13 +153,13 @@ def mass_matrix(p: Parameters, q: np.ndarray, bar_inertia: float) -> np.ndarray:
     return total
 
 
-def potential(p: Parameters, q: np.ndarray, bar_inertia: float) -> np.ndarray:
+def potential(p: Any, q: np.ndarray, bar_inertia: float) -> np.ndarray:
     """V = -sum m g x3, for x3 points down."""
     return -p.g * sum(mass * position[:, 2] for mass, position in point_masses(p, q, bar_inertia))
 
 
 def lagrange(
-    p: Parameters, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, force: np.ndarray, bar_inertia: float
+    p: Any, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, force: np.ndarray, bar_inertia: float
 ) -> np.ndarray:
     """tau = d/dt dT/dqd - dT/dq + dV/dq - J^T F with T = qd^T M(q) qd / 2."""
     inertia = mass_matrix(p, q, bar_inertia)
@@ -164,7 +174,7 @@ def lagrange(
     )
 
 
-def motion(p: Parameters, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def motion(p: Any, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     jacobian = gradients(lambda z: platform(p, z), q)
     slope = differences(lambda z: gradients(lambda y: platform(p, y), z), q)
     bend = np.einsum("nijk,nk,nj->ni", slope, qd, qd)
@@ -175,7 +185,7 @@ def peak_errors(candidate: np.ndarray, reference: np.ndarray) -> np.ndarray:
     return np.array([relative_error(candidate[:, j], reference[:, j]).peak_error for j in range(3)])
 
 
-def without_bar_inertia(p: Parameters) -> Parameters:
+def without_bar_inertia(p: Any) -> Any:
     return dataclasses.replace(p, I1_left=0.0, I1_right=0.0, I2_left=0.0, I2_right=0.0, I5=0.0)
 
 
@@ -203,7 +213,7 @@ FRICTION = ("damping_", "coulomb_", "armature_")
 """Begin the names of what is added to every form alike, and tested with friction."""
 
 
-@pytest.mark.parametrize("field", [f.name for f in dataclasses.fields(Parameters) if not f.name.startswith(FRICTION)])
+@pytest.mark.parametrize("field", [f.name for f in dataclasses.fields(table_1()) if not f.name.startswith(FRICTION)])
 def test_lagrange_tells_every_parameter(field: str) -> None:
     """A spoiled parameter must show in the rotation form, or the oracle would be blind to its term."""
     p, (q, qd, qdd, force) = random_robot(2), random_states(2)

@@ -213,7 +213,7 @@ def test_changes_as_users_write_them(changes: list[str], expected: dict[str, flo
     loaded = bundled(ASYM)
     assert loaded.description is not None
     assert loaded.values is not None
-    assert resolve_changes(loaded.kind, loaded.values, changes) == expected
+    assert resolve_changes(loaded.description.table, loaded.values, changes) == expected
     assert resolve_for(ASYM, changes) == expected
     for name, value in resolve_for(ASYM, changes).items():
         assert math.copysign(1, value) == math.copysign(1, expected[name])

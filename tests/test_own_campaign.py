@@ -98,7 +98,7 @@ def test_reading_leaves_no_threads_behind(workbench: Workbench) -> None:
 
 
 FAULTS = {
-    "raises": ("    return p.nope * q", "(mine.py:7) AttributeError: 'Parameters' object has no attribute 'nope'"),
+    "raises": ("    return p.nope * q", '(mine.py:7) AttributeError: no parameter "nope"; valid: a1, g, m1'),
     "wrong shape": ("    return q[:, 0]", "(mine.py:4) returns an array of shape (41,); expected (41, 1)"),
     "not finite": ("    return np.where(q > 1.2, np.nan, q)", "(mine.py:4) returns nan for sample"),
     "leaves": ("    raise SystemExit(0)", "(mine.py:7) SystemExit: 0"),
@@ -215,12 +215,16 @@ SPEC = {
         ('actuated = ["crank"]\nplatform_site = "coupler"\n', ""),
         "initial goes with actuated and platform_site",
     ),
-    "parameter that no formula can name": (("m1 =", "lambda ="), 'lambda = "mass crank": formulas read p.NAME'),
-    "unknown quantity": (('"mass crank"', '"mas crank"'), 'm1 = "mas crank": unknown quantity; did you mean "mass"?'),
+    "parameter that no formula can name": (("m1 =", "lambda ="), "read.lambda: formulas read p.NAME"),
+    "unknown quantity": (('"mass crank"', '"mas crank"'), 'read.m1 "mas crank": unknown place; did you mean "mass"?'),
     "unknown body": (('"mass crank"', '"mass crnk"'), 'no body "crnk"; did you mean "crank"?'),
     "form": (('"offset coupler x"', '"offset coupler"'), 'allowed: "offset BODY x|y|z"'),
     "axis": (('"offset coupler x"', '"offset coupler w"'), 'axis "w"; allowed: x, y, z'),
-    "parameters": (("[read]", "[parameters]\nm1 = 1.0\n[read]"), "parameter m1 cannot be set; edit the MJCF"),
+    "parameter out of range": (("[read]", "[parameters]\nm1 = -1.0\n[read]"), "allowed for a body that moves"),
+    "computed parameter": (
+        ('g = "gravity"\n', 'I1 = "inertia crank y"\n[parameters]\nI1 = 1.0\n'),
+        "is computed by MuJoCo and stands nowhere in the file",
+    ),
     "ignore": (("[read]", "[read]\n"), None),
 }
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from own_mechanisms import FOURBAR, PARALLELOGRAM
-from workbench.campaign.generic import generic_mechanism
+from workbench.campaign.robot_spec import RobotKeys
+from workbench.capabilities.robot import robot_with
 from workbench.errors import ModelError, MotionError, WorkbenchError
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
@@ -112,8 +113,9 @@ def test_what_would_spin_a_rod_is_warned_of(tmp_path: Path, attribute: str, warn
     value = "0 0 0" if attribute == "pos" else "0.1"
     path = tmp_path / "model.xml"
     path.write_text(RSSR.replace('type="ball"', f'type="ball" {attribute}="{value}"'))
-    mechanism = generic_mechanism(path, Setup(("crank",), "coupler"))
-    warnings = mechanism.warnings(np.zeros(1), np.zeros((1, 1)))
+    keys = RobotKeys(model="model.xml", actuated=["crank"], platform_site="coupler")
+    robot = robot_with(path, {}, keys.own_robot(path, path))
+    warnings = robot.warnings(np.zeros(1), np.zeros((1, 1)))
     assert [text.split(":")[0] for text in warnings] == (["rod rod"] if warned else [])
 
 

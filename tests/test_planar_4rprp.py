@@ -6,10 +6,10 @@ Every comparison has a twin that is spoiled on purpose and must exceed the toler
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
-from workbench.robots.planar_4rprp.parameters import Parameters
 
 from planar_4rprp_cases import (
     DIFFERENCES,
@@ -26,6 +26,7 @@ from planar_4rprp_cases import (
     second_rate,
     slow,
 )
+from workbench.capabilities.robot import Robot
 from workbench.capabilities.robot import load_robot as load_mechanism
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.robots import screws
@@ -34,9 +35,9 @@ from workbench.robots.planar_4rprp.closed_form import HOME_SOLUTION, Planar4Rprp
 
 
 @pytest.fixture(scope="module")
-def robot() -> Planar4Rprp:
+def robot() -> Robot:
     mechanism = load_mechanism(MODEL)
-    assert isinstance(mechanism, Planar4Rprp)
+    assert isinstance(mechanism.closed_form, Planar4Rprp)
     return mechanism
 
 
@@ -48,7 +49,7 @@ def reference() -> MujocoReference:
 # --- kinematics
 
 
-def test_table_2_with_its_signs(robot: Planar4Rprp):
+def test_table_2_with_its_signs(robot: Robot):
     printed = 1e-3 * np.array(
         [[264.86, -248.13, 300], [-264.86, -248.13, 300], [300, 248.13, 300], [-300, 248.13, 300]]
     )
@@ -58,7 +59,7 @@ def test_table_2_with_its_signs(robot: Planar4Rprp):
     assert np.abs(found - np.abs(printed)).max() > 5e-6  # without the signs that the scan lost
 
 
-def test_all_four_solutions_have_the_same_limb_lengths(robot: Planar4Rprp):
+def test_all_four_solutions_have_the_same_limb_lengths(robot: Robot):
     q, _, _ = scattered(robot, 50, 1)
     p = robot.parameters
     x = robot.forward_kinematics_all(q)
@@ -69,7 +70,7 @@ def test_all_four_solutions_have_the_same_limb_lengths(robot: Planar4Rprp):
     np.testing.assert_allclose(lengths[real], np.broadcast_to(q[:, None], x.shape)[real], atol=1e-14)
 
 
-def test_a_solution_that_is_not_real_is_nan(robot: Planar4Rprp):
+def test_a_solution_that_is_not_real_is_nan(robot: Robot):
     # limb 2 long enough for the upper solutions, too short for the lower ones
     q = robot.inverse_kinematics([[0.01, 0.25, 0.3]])
     found = robot.forward_kinematics_all(q)[0]
@@ -77,12 +78,12 @@ def test_a_solution_that_is_not_real_is_nan(robot: Planar4Rprp):
     assert np.isfinite(found[2:]).all()
 
 
-def test_inverse_kinematics_undoes_forward_kinematics(robot: Planar4Rprp):
+def test_inverse_kinematics_undoes_forward_kinematics(robot: Robot):
     q, _, _ = scattered(robot, 100, 2)
     np.testing.assert_allclose(robot.inverse_kinematics(robot.forward_kinematics(q)), q, atol=1e-14)
 
 
-def test_platform_motion_by_finite_differences(robot: Planar4Rprp):
+def test_platform_motion_by_finite_differences(robot: Robot):
     q, qd, qdd = slow(robot, 40, 3)
     x, xd, xdd = robot.platform_motion(q, qd, qdd)
     moved = along(robot.forward_kinematics, q, qd, qdd)
@@ -96,7 +97,7 @@ def test_platform_motion_by_finite_differences(robot: Planar4Rprp):
         np.testing.assert_allclose(found, expected, atol=1e-11)
 
 
-def test_reduced_jacobian_inverts_the_jacobian_and_has_the_determinant_stated(robot: Planar4Rprp):
+def test_reduced_jacobian_inverts_the_jacobian_and_has_the_determinant_stated(robot: Robot):
     q, _, _ = scattered(robot, 60, 4)
     rows = robot.reduced_jacobian(q)
     np.testing.assert_allclose(rows @ robot.jacobian(q), np.broadcast_to(np.eye(3), rows.shape), atol=1e-13)
@@ -126,7 +127,7 @@ class Spoil:
 NOTHING = Spoil()
 
 
-def oracle(p: Parameters, motion: Motion, force: np.ndarray, spoil: Spoil = NOTHING) -> np.ndarray:
+def oracle(p: Any, motion: Motion, force: np.ndarray, spoil: Spoil = NOTHING) -> np.ndarray:
     """D'Alembert for eleven bodies; accelerations and partial derivatives by finite differences of positions.
 
     Positions come from eq. (14)-(16); nothing is shared with the package.
@@ -186,7 +187,7 @@ SPOILED = {
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_torques_by_finite_differences_of_positions(robot: Planar4Rprp, seed: int):
+def test_torques_by_finite_differences_of_positions(robot: Robot, seed: int):
     mechanism = robot.with_parameters(**random_parameters(seed)) if seed else robot
     motion = slow(mechanism, 30, seed)
     force = np.array([40.0, -100.0, 70.0])
@@ -195,14 +196,14 @@ def test_torques_by_finite_differences_of_positions(robot: Planar4Rprp, seed: in
 
 
 @pytest.mark.parametrize("spoil", SPOILED.values(), ids=SPOILED.keys())
-def test_the_oracle_sees_what_is_spoiled(robot: Planar4Rprp, spoil: Spoil):
+def test_the_oracle_sees_what_is_spoiled(robot: Robot, spoil: Spoil):
     motion = slow(robot, 30, 0)
     force = np.array([40.0, -100.0, 70.0])
     tau = robot.inverse_dynamics(*motion, external_force=force)
     assert (peak_error(tau, oracle(robot.parameters, motion, force, spoil)) > 1e-5).any()
 
 
-def test_lumped_masses_are_bars_without_rotational_inertia(robot: Planar4Rprp):
+def test_lumped_masses_are_bars_without_rotational_inertia(robot: Robot):
     motion = example(101, speed=10.0)
     p = dataclasses.replace(robot.parameters, I2x=0.0, I2z=0.0, I3x=0.0, I3z=0.0)
     lumped = robot.inverse_dynamics(*motion, mass_model="lumped")
@@ -210,7 +211,7 @@ def test_lumped_masses_are_bars_without_rotational_inertia(robot: Planar4Rprp):
     assert (peak_error(robot.inverse_dynamics(*motion), lumped) > 1e-2).all()
 
 
-def test_power_balance(robot: Planar4Rprp, reference: MujocoReference):
+def test_power_balance(robot: Robot, reference: MujocoReference):
     """tau . qd + f . xd = dE/dt, with MuJoCo's energy along a smooth motion."""
     time = np.linspace(0.0, 0.4, 4001)
     q, qd, qdd = (np.squeeze(part) for part in _sines(time))
@@ -258,7 +259,7 @@ def test_random_parameters_and_forces_against_mujoco(seed: int):
 
 
 @pytest.mark.parametrize("force", [None, (0.0, -1000.0, 0.0), (0.0, 1000.0, 0.0)])
-def test_the_papers_example_against_mujoco(robot: Planar4Rprp, reference: MujocoReference, force):
+def test_the_papers_example_against_mujoco(robot: Robot, reference: MujocoReference, force):
     motion = example(101)
     truth = reference.inverse_dynamics(*motion, external_force=force).tau
     for name in ("distributed", "screws"):
@@ -266,7 +267,7 @@ def test_the_papers_example_against_mujoco(robot: Planar4Rprp, reference: Mujoco
         assert (peak_error(robot.candidates[name].function(robot, *motion, given), truth) < ROUND_OFF).all()
 
 
-def test_forces_of_the_papers_example(robot: Planar4Rprp):
+def test_forces_of_the_papers_example(robot: Robot):
     """Ranges in newtons that the assumptions written in the model lead to."""
     motion = example(2001)
 
@@ -284,7 +285,7 @@ def test_forces_of_the_papers_example(robot: Planar4Rprp):
 # --- the paper's own route
 
 
-def test_screws_agree_with_the_direct_form(robot: Planar4Rprp):
+def test_screws_agree_with_the_direct_form(robot: Robot):
     for seed in range(20):
         mechanism = robot.with_parameters(**random_parameters(seed))
         q, qd, qdd = scattered(mechanism, 20, seed)
@@ -298,7 +299,7 @@ def test_screws_agree_with_the_direct_form(robot: Planar4Rprp):
         assert (peak_error(printed, direct["distributed"]) > 1e-3).all()
 
 
-def test_the_virtual_line_is_reciprocal_to_all_but_the_actuator(robot: Planar4Rprp):
+def test_the_virtual_line_is_reciprocal_to_all_but_the_actuator(robot: Robot):
     x = robot.forward_kinematics(scattered(robot, 10, 5)[0])
     for number in (1, 2, 3, 4):
         chain = screw_route.limb(robot.parameters, number, x).screws
@@ -306,7 +307,7 @@ def test_the_virtual_line_is_reciprocal_to_all_but_the_actuator(robot: Planar4Rp
         np.testing.assert_allclose(form, np.broadcast_to([0, 0, 0, 1, 0, 0], form.shape), atol=1e-15)
 
 
-def test_accelerations_by_lie_screws_and_the_lost_sign(robot: Planar4Rprp):
+def test_accelerations_by_lie_screws_and_the_lost_sign(robot: Robot):
     q, qd, qdd = scattered(robot, 30, 6)
     x, xd, xdd = robot.platform_motion(q, qd, qdd)
     right = screw_route.motion(robot.parameters, qd, qdd, x)

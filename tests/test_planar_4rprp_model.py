@@ -14,6 +14,7 @@ from planar_4rprp_cases import (
     random_parameters,
     scattered,
 )
+from workbench.capabilities.robot import Robot
 from workbench.capabilities.robot import load_robot as load_mechanism
 from workbench.errors import MotionError, ParameterError
 from workbench.reference.mujoco_reference import MujocoReference
@@ -24,9 +25,9 @@ from workbench.robots.planar_4rprp.singularity import PaperCondition, paper_sing
 
 
 @pytest.fixture(scope="module")
-def robot() -> Planar4Rprp:
+def robot() -> Robot:
     mechanism = load_mechanism(MODEL)
-    assert isinstance(mechanism, Planar4Rprp)
+    assert isinstance(mechanism.closed_form, Planar4Rprp)
     return mechanism
 
 
@@ -38,7 +39,7 @@ def reference() -> MujocoReference:
 # --- mobility and singular poses
 
 
-def test_mobility_by_gogus_count_and_by_rank(robot: Planar4Rprp, reference: MujocoReference):
+def test_mobility_by_gogus_count_and_by_rank(robot: Robot, reference: MujocoReference):
     count = gogu_mobility(robot.parameters)
     assert (count.p, count.r, count.mobility) == (14, 11, 3)
     assert (count.limb_connectivity, count.rod_connectivity) == (((3, 3), (3, 3)), (3, 3))
@@ -48,7 +49,7 @@ def test_mobility_by_gogus_count_and_by_rank(robot: Planar4Rprp, reference: Mujo
     assert (by_rank.joint_freedoms, by_rank.rank, by_rank.mobility, by_rank.idle_freedoms) == (14, 11, 3, 0)
 
 
-def test_a_tilted_axis_changes_the_rank(robot: Planar4Rprp):
+def test_a_tilted_axis_changes_the_rank(robot: Robot):
     matrix = loop_matrix(robot.parameters, [[0.25, 0.22, 0.35]])
     assert np.linalg.matrix_rank(matrix, tol=1e-9) == 11
     tilted = matrix.copy()
@@ -61,7 +62,7 @@ def _held(conditions: tuple[PaperCondition, ...]) -> dict[str, bool]:
     return {condition.name: condition.holds for condition in conditions}
 
 
-def test_figure_7_is_no_singular_pose(robot: Planar4Rprp):
+def test_figure_7_is_no_singular_pose(robot: Robot):
     q = robot.inverse_kinematics([[0.3, robot.parameters.h, 0.3]])  # Py = h: limbs 2 and 4 in line
     assert parallelism(robot, q)[0] < 1e-12
     assert not _held(paper_singularity_conditions(robot, q))["w2 not parallel to w4 (Figure 7): |w2 x w4| > 0"]
@@ -69,7 +70,7 @@ def test_figure_7_is_no_singular_pose(robot: Planar4Rprp):
     assert np.isfinite(robot.inverse_dynamics(q, 0 * q, 0 * q)).all()
 
 
-def test_the_papers_conditions_are_not_necessary(robot: Planar4Rprp):
+def test_the_papers_conditions_are_not_necessary(robot: Robot):
     # from one side to the other at a constant height; and a pose beyond A1
     z = np.linspace(0.1, 0.5, 41)
     across = robot.inverse_kinematics(np.stack([0 * z + 0.3, 0 * z + 0.15, z], axis=1))
@@ -80,7 +81,7 @@ def test_the_papers_conditions_are_not_necessary(robot: Planar4Rprp):
     assert not _held(paper_singularity_conditions(robot, beyond))["max q3 < sqrt(min q1^2 + b^2)"]
 
 
-def test_the_papers_printed_conditions_are_not_sufficient(robot: Planar4Rprp):
+def test_the_papers_printed_conditions_are_not_sufficient(robot: Robot):
     q = robot.inverse_kinematics([[1e-9, 0.25, 0.3]])
     with pytest.raises(MotionError, match="det J_r"):
         robot.forward_kinematics(q)
@@ -93,7 +94,7 @@ def test_the_papers_printed_conditions_are_not_sufficient(robot: Planar4Rprp):
     assert q3 < np.hypot(q1, b)
 
 
-def test_condition_number_is_that_of_the_rows(robot: Planar4Rprp):
+def test_condition_number_is_that_of_the_rows(robot: Robot):
     q, _, _ = scattered(robot, 10, 7)
     values = np.linalg.svd(robot.reduced_jacobian(q), compute_uv=False)
     np.testing.assert_allclose(robot.condition_number(q), values[:, 0] / values[:, -1], rtol=1e-12)
@@ -112,7 +113,7 @@ def test_condition_number_is_that_of_the_rows(robot: Planar4Rprp):
         ((0.3, 0.37, 0.3), "q1, q2, q3"),
     ],
 )
-def test_bad_poses_are_refused_by_sample_and_joint(robot: Planar4Rprp, q: tuple[float, ...], joint: str):
+def test_bad_poses_are_refused_by_sample_and_joint(robot: Robot, q: tuple[float, ...], joint: str):
     batch = np.stack([HOME, HOME, np.array(q)])
     for call in (robot.forward_kinematics, robot.jacobian, lambda s: robot.inverse_dynamics(s, 0 * s, 0 * s)):
         with pytest.raises(MotionError) as caught:
@@ -121,19 +122,19 @@ def test_bad_poses_are_refused_by_sample_and_joint(robot: Planar4Rprp, q: tuple[
         assert "\n" not in str(caught.value)
 
 
-def test_positions_off_the_home_branch_are_refused(robot: Planar4Rprp):
+def test_positions_off_the_home_branch_are_refused(robot: Robot):
     for x, words in (((-0.3, 0.25, 0.3), "Px > 0"), ((0.3, -0.25, 0.3), "Py > 0"), ((0.6, 0.02, 0.3), "limb 4")):
         with pytest.raises(MotionError, match=words):
             robot.inverse_kinematics([x])
 
 
-def test_parameters_are_checked(robot: Planar4Rprp):
+def test_parameters_are_checked(robot: Robot):
     for changes in ({"b": 0.0}, {"m2": -1.0}, {"payload": 1.0}, {"I2x": 0.0}):
         with pytest.raises(ParameterError, match=next(iter(changes))):
             robot.with_parameters(**changes)
 
 
-def test_a_bar_stays_uniform_unless_its_inertia_is_given(robot: Planar4Rprp):
+def test_a_bar_stays_uniform_unless_its_inertia_is_given(robot: Robot):
     p = robot.with_parameters(m2=0.5).parameters
     assert p.I2x == p.I2z == pytest.approx(0.5 * (2 * p.c2) ** 2 / 12, rel=1e-15)
     assert (p.I3x, p.I3z) == (robot.parameters.I3x, robot.parameters.I3z)
@@ -146,7 +147,7 @@ def test_a_bar_stays_uniform_unless_its_inertia_is_given(robot: Planar4Rprp):
 # --- the model
 
 
-def test_table_3_and_the_assumptions_stand_in_the_model(robot: Planar4Rprp):
+def test_table_3_and_the_assumptions_stand_in_the_model(robot: Robot):
     p = robot.parameters
     assert (p.a, p.b, p.h, p.g) == (0.6, 0.6, 0.02, 9.81)
     assert (p.m2, p.m3, p.m4, p.m6) == (0.357, 0.155, 0.339, 0.212)

@@ -19,10 +19,16 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 """IEEE arithmetic throughout, no fast-math: NaN stays NaN, and a sample's result does not depend on whether it was
 computed alone, in a vector register with others, or in another thread. A division by zero is infinite, as in NumPy."""
 
+ROOT = Path(__file__).parent
+
 KERNEL_FILES = (
     "recorded/kernels.py",
-    *(f"robots/asym_2rss_ppap/{name}.py" for name in ("kernel", "friction")),
-    *(f"robots/planar_4rprp/{name}.py" for name in ("kernel", "friction")),
+    # each robot that comes with the package keeps its machine code in files of these names
+    *(
+        path.relative_to(ROOT).as_posix()
+        for name in ("kernel", "friction")
+        for path in sorted(ROOT.glob(f"robots/*/{name}.py"))
+    ),
     *(f"robots/{name}.py" for name in ("blocks", "sine_cosine")),
     *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "structure", "tables")),
     *(f"reference/{name}.py" for name in ("task_rows", "platform_kernels")),
@@ -59,8 +65,7 @@ _known: list[str] = []
 
 def _fingerprint() -> str:
     if not _known:
-        root = Path(__file__).parent
-        sources = b"".join((root / name).read_bytes() for name in ("compiled.py", *KERNEL_FILES))
+        sources = b"".join((ROOT / name).read_bytes() for name in ("compiled.py", *KERNEL_FILES))
         _known.append(hashlib.sha256(sources).hexdigest())
     return _known[0]
 

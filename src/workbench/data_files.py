@@ -61,7 +61,7 @@ def bundled(kind: Kind, name: str, package: Path = _PACKAGE) -> Path:
     kind
         ``models`` or ``campaigns``.
     name
-        File name, with or without its ending: ``asym_2rss_ppap.xml`` or ``asym_2rss_ppap``.
+        File name, with or without its ending: ``NAME.xml`` or ``NAME``.
     package
         Directory of the package ``workbench``; another one only in tests.
 

@@ -9,13 +9,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch
 from workbench.capabilities.defaults import robot_of_model
-from workbench.capabilities.limits import coordinate_limits, reach_box
+from workbench.capabilities.identity import RobotIdentity
+from workbench.capabilities.limits import reach_box
 from workbench.capabilities.samples import one_or_many
 from workbench.capabilities.warnings import (
     millimetre_warnings,
@@ -34,7 +34,7 @@ from workbench.robots.robot_file import RobotFile
 __all__ = ["Robot", "load_robot", "robot_with"]
 
 
-class Robot:
+class Robot(RobotIdentity):
     """One robot with its parameters; made by `load_robot`, changed by `with_parameters` into another.
 
     Where its formulas offer something in closed form (`workbench.robots.closed_form.ClosedForm`), that is used, else
@@ -66,89 +66,19 @@ class Robot:
             f" {len(self._values)} parameters, kinematics by {by}>"
         )
 
-    # what it is
+    def __getattr__(self, name: str) -> Any:
+        """What else the robot's formulas offer: ``robot.reduced_jacobian(q)``.
 
-    @property
-    def description(self) -> Description:
-        """What the robot file says of the model."""
-        return self._description
-
-    @property
-    def name(self) -> str:
-        """The robot's name."""
-        return self._description.name
-
-    @property
-    def title(self) -> str:
-        """The robot's title; its name where the file gives none."""
-        return self._description.robot.spec.title or self.name
-
-    @property
-    def reference_key(self) -> str:
-        """Bibliography key of its source, explained in docs/references.md; may be empty."""
-        return self._description.robot.spec.reference
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Actuated joints, in the order of q and tau."""
-        return self._description.joints
-
-    @cached_property
-    def _slides(self) -> tuple[bool, ...]:
-        model = self._base.model
-        ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, joint) for joint in self.joints]
-        return tuple(bool(model.jnt_type[i] == mujoco.mjtJoint.mjJNT_SLIDE) for i in ids)
-
-    @property
-    def coordinate_units(self) -> tuple[str, ...]:
-        """Unit of each q, ``m`` or ``rad``."""
-        return tuple("m" if slide else "rad" for slide in self._slides)
-
-    @property
-    def force_units(self) -> tuple[str, ...]:
-        """Unit of each tau, ``N`` or ``N m``."""
-        return tuple("N" if slide else "N m" for slide in self._slides)
-
-    @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Task coordinates: some of ``x y z rx ry rz``."""
-        return self._description.robot.spec.platform.task
-
-    @property
-    def platform_axes(self) -> tuple[str, ...]:
-        """Names of the task coordinates as the robot's source writes them."""
-        platform = self._description.robot.spec.platform
-        return tuple(platform.names or platform.task)
-
-    @property
-    def task_units(self) -> tuple[str, ...]:
-        """Unit of each task coordinate, ``m`` or ``rad``."""
-        return tuple("rad" if name.startswith("r") else "m" for name in self.coordinates)
-
-    @cached_property
-    def up(self) -> tuple[float, float, float]:
-        """Unit vector against gravity along one axis of the base body's frame."""
-        model = self._base.model
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, self._description.robot.spec.base)
-        gravity = np.asarray(model.opt.gravity) @ data.xmat[max(body, 0)].reshape(3, 3)
-        axis = int(np.argmax(np.abs(gravity))) if gravity.any() else 2
-        sign = -1.0 if gravity[axis] > 0 else 1.0
-        return tuple(sign if i == axis else 0.0 for i in range(3))  # type: ignore[return-value]
-
-    @property
-    def joint_limits(self) -> tuple[tuple[float, float], ...]:
-        """Range of each actuated coordinate: of the robot file, of the model's joints, or as far as one may look."""
-        return coordinate_limits(self._description, self._base.model)
-
-    @property
-    def mass_models(self) -> tuple[str, ...]:
-        """Mass models that the reference has."""
-        return ("distributed", "lumped") if self._description.robot.spec.lumped else ("distributed",)
+        Raises
+        ------
+        AttributeError
+            Neither robot nor formulas have it.
+        """
+        if not name.startswith("_") and self._kind is not None and hasattr(self._kind, name):
+            return getattr(self.closed_form, name)
+        raise AttributeError(f"robot {self.__dict__.get('_description') and self.name} has no attribute {name!r}")
 
     # parameters
-
     @cached_property
     def parameters(self) -> Any:
         """The frozen dataclass of parameters, SI."""
@@ -208,7 +138,6 @@ class Robot:
         return MujocoReference(self.loaded.file, loaded=self.loaded)
 
     # formulas
-
     @cached_property
     def closed_form(self) -> Any:
         """The robot's kinematics and dynamics in closed form; None where nobody registered any."""
@@ -254,16 +183,12 @@ class Robot:
             return moved
         return self.reference.platform_motion(self._checked(q), qd, qdd, self.coordinates)
 
-    def platform_along(
-        self, t: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """As `platform_motion`, for samples that are one motion, in the order of times ``(n,)``.
-
-        Closed forms know their branch from q alone; what closes loops step by step follows the motion.
-        """
+    def platform_along(self, t: FloatArray, *motion: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """As `platform_motion`, of samples that are one motion at times ``(n,)``: loops are closed along it."""
         if self._own("platform_motion"):
-            return self.platform_motion(q, qd, qdd)
-        return self.reference.platform_motion(self._checked(q), qd, qdd, self.coordinates, along=t)
+            return self.platform_motion(*motion)
+        q, qd, qdd = motion
+        return self.reference.platform_motion(self._checked(q), qd, qdd, self.coordinates, t)
 
     @one_or_many(1)
     def jacobian(self, q: ArrayLike) -> FloatArray:
@@ -272,10 +197,13 @@ class Robot:
         return own(q) if own else self.reference.jacobian(q, self.coordinates)
 
     @one_or_many(1)
-    def inverse_kinematics(self, x: ArrayLike, **branch: Any) -> FloatArray:
-        """Actuated coordinates ``(n, na)`` from task coordinates ``(n, m)``, on the home branch."""
+    def inverse_kinematics(self, x: ArrayLike, *branch: Any, **named: Any) -> FloatArray:
+        """Actuated coordinates ``(n, na)`` from task coordinates ``(n, m)``, on the home branch.
+
+        Further arguments are those of the robot's own closed form, such as the branch of each elbow.
+        """
         own = self._own("inverse_kinematics")
-        return own(x, **branch) if own else self.reference.inverse_kinematics(x, self.coordinates)
+        return own(x, *branch, **named) if own else self.reference.inverse_kinematics(x, self.coordinates)
 
     @one_or_many(3)
     def joint_motion(self, x: ArrayLike, xd: ArrayLike, xdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -258,11 +258,11 @@ def _agreement(reached: _Closed, closed_form: Any, ranges: tuple[JointRange, ...
         q = home + reach * random.uniform(low, high)
         try:
             model = reached.platform(reached.closer.close(q[None, :]).qpos)
-            closed_form = closed_form.forward_kinematics(q[None, :])
+            expected = closed_form.forward_kinematics(q[None, :])
         except MotionError:  # a pose that one of them cannot take is no place to compare
             continue
         compared += 1
-        distance = float(np.linalg.norm(model - closed_form))
+        distance = float(np.linalg.norm(model - expected))
         if distance >= gap:
             gap, worst = distance, q
     file, site = reached.loaded.file, closed_form.layout.platform_site

@@ -80,7 +80,7 @@ def find_source(path: str | Path) -> Source:
     if folder:
         raise ModelError(f"{path}: is a directory without {FILE}; a robot is a folder with one, or an XML file")
     if place.suffix == ".toml":
-        raise SpecError(f"{path}: no such robot file", file=str(path))
+        raise ModelError(f"{path}: no such robot or model file", file=str(path))
     return Source(find_model(path), str(path), None)
 
 

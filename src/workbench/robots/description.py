@@ -9,14 +9,14 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from workbench.errors import ModelError
+from workbench.errors import ModelError, SpecError, did_you_mean
 from workbench.mjcf.text import Element, find, tokens
 from workbench.robots.assumptions.layout import Layout
 from workbench.robots.closed_form import ClosedForm
 from workbench.robots.formulas import bundled_closed_form
 from workbench.robots.parameter_set import parameter_type
 from workbench.robots.parameters import ParameterTable, Target
-from workbench.robots.places import AXES
+from workbench.robots.places import AXES, kind_of
 from workbench.robots.robot_file import BarSpec, RobotFile
 
 
@@ -66,7 +66,43 @@ def describe(robot: RobotFile, model: mujoco.MjModel, text: str, elements: list[
     """
     bars = [t for bar in robot.spec.bars for body in bar.bodies for t in _bar(bar, body, robot, model, text, elements)]
     closed_form = bundled_closed_form(robot) if robot.builtin else None
+    if closed_form is None or closed_form.layout is None:  # a layout says it better, with all that it needs
+        _refuse_missing(robot, model, elements)
     return Description(robot, (*robot.targets, *bars), closed_form)
+
+
+OBJECTS = {
+    "body": mujoco.mjtObj.mjOBJ_BODY,
+    "site": mujoco.mjtObj.mjOBJ_SITE,
+    "joint": mujoco.mjtObj.mjOBJ_JOINT,
+}
+COUNTS = {"body": "nbody", "site": "nsite", "joint": "njnt"}
+
+
+def _refuse_missing(robot: RobotFile, model: mujoco.MjModel, elements: list[Element]) -> None:
+    """Refuse places in elements that the model does not have.
+
+    Raises
+    ------
+    SpecError
+        Naming parameter, place, element and the nearest one that exists.
+    """
+    for target in robot.targets:
+        if target.optional:
+            continue
+        for what, name in zip(kind_of(target).elements, target.name.split("\n"), strict=False):
+            if what == "geom":
+                known = [e.name or e.body for e in elements if e.tag == "geom" and (e.name or e.body)]
+                missing = find(elements, "geom", name) is None
+            else:
+                missing = mujoco.mj_name2id(model, OBJECTS[what], name) < 0
+                every = range(getattr(model, COUNTS[what]))
+                known = [n for i in every if (n := mujoco.mj_id2name(model, OBJECTS[what], i))]
+            if missing:
+                hint = did_you_mean(name, set(known))
+                raise SpecError(
+                    f'{robot.shown}: {robot.key_of(target)} "{target.words}": no {what} "{name}"{hint}', key=name
+                )
 
 
 def _bar(

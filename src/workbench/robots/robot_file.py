@@ -243,6 +243,10 @@ class RobotFile:
             bars.append(Bar(bar.mass, names[1], bar.half_length is not None, tuple(bar.inertia), bar.centre))
         return ParameterTable(infos, {g: tuple(m) for g, m in spec.groups.items()}, tuple(bars))
 
+    def key_of(self, target: Target) -> str:
+        """Key of the place that a target stands for, for messages."""
+        return self._key(target.reads or target.of[0], "at")
+
     def _key(self, name: str, key: str = "") -> str:
         return f"read.{name}" if self.section == "read" else ".".join(["parameters", name, *([key] if key else [])])
 
