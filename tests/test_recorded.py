@@ -336,3 +336,6 @@ def test_records_name_a_case_that_exists(tmp_path: Path) -> None:
     campaign = written(tmp_path, None, 'case = "bensch"\n')
     with pytest.raises(SpecError, match=r'recorded "ADAMS 2010" names case "bensch".*bench'):
         run_campaign(campaign, tmp_path / "run")
+    campaign = written(tmp_path, None, '[[recorded]]\nlabel = "ADAMS 2010"\nfile = "table.csv"\n')
+    with pytest.raises(SpecError, match='two records have the label "ADAMS 2010"'):
+        run_campaign(campaign, tmp_path / "run")

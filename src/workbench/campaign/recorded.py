@@ -110,7 +110,10 @@ def records_of(specs: list[RecordedSpec], case: str, cases: list[str], file: str
     SpecError
         A record that names no case where there are several, or one that does not exist.
     """
+    labels = [spec.label for spec in specs]
     for spec in specs:
+        if labels.count(spec.label) > 1:
+            raise SpecError(f'{file}: two records have the label "{spec.label}"', file=file)
         if spec.case is None and len(cases) > 1:
             raise SpecError(f'{file}: recorded "{spec.label}": case: missing; the campaign has {len(cases)}', file=file)
         if spec.case is not None and spec.case not in cases:
