@@ -19,7 +19,7 @@ PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_model
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow test-browser reports bench lint format clean
+.PHONY: help setup run test test-slow test-browser test-floors reports bench lint format clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -62,6 +62,17 @@ test-slow: $(STAMP) ## Run only the tests marked slow
 test-browser: $(STAMP) ## Run the tests that open a report in Chromium
 	$(BIN)/pytest -n 2 -m browser $(PYTEST_ARGS)
 
+# The lowest versions that pyproject.toml allows, in an environment of their own; some minutes, so not among the other tests.
+test-floors: $(STAMP) ## Run the tests with the lowest versions of all dependencies
+	@mkdir -p build && $(BIN)/python tests/floors.py > build/floors.txt
+	@if [ ! -d $(VENV)-floors ]; then $(BIN)/python -m venv $(VENV)-floors; fi
+ifneq ($(UV),)
+	@"$(UV)" pip install --quiet --python $(VENV)-floors/bin/python --constraint build/floors.txt --editable '.[dev]'
+else
+	@$(VENV)-floors/bin/python -m pip install --quiet --disable-pip-version-check --constraint build/floors.txt --editable '.[dev]'
+endif
+	$(VENV)-floors/bin/pytest -n 2 --dist worksteal $(PYTEST_ARGS)
+
 # Rendered pictures depend on the machine's OpenGL, so those that are kept are used again; remove them to draw new ones.
 reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings in their heads differ
 	@for name in $(PUBLISHED); do \
@@ -92,5 +103,5 @@ format: $(STAMP) ## Put the code into shape
 	$(BIN)/ruff format .
 
 clean: ## Remove .venv, caches and builds
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-floors build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

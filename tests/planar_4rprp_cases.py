@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from workbench.capabilities.robot import load_robot as load_mechanism
+from workbench.capabilities.load import load_robot as load_mechanism
 
 MODEL = str(Path(__file__).resolve().parents[1] / "models" / "planar_4rprp.xml")
 HOME = np.array([0.3893182978, 0.3768866111, 0.3893182978])

@@ -19,9 +19,9 @@ PACKAGE = "workbench"
 MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("cli", "commands", "console"),
+    ("__main__", "cli", "commands", "console"),
     ("report", "compare", "rendering"),
-    ("sweep",),
+    ("sweep", "diagnosis", "importing"),
     ("campaign", "workspace"),
     ("capabilities",),
     ("recorded",),
@@ -32,6 +32,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "motion",
         "delimited",
         "foreign",
+        "hints",
         "metrics",
         "dry_friction",
         "staging",
@@ -41,6 +42,13 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "errors",
         "data_files",
         "limits",
+        "processes",
+        "reading",
+        "records",
+        "file_lock",
+        "scratch",
+        "shielded",
+        "plotting",
         "schema",
         "documents",
         "_version",

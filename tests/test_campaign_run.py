@@ -158,11 +158,11 @@ def test_every_key_is_documented(workbench: Workbench, repository: Path, page: s
     text = (repository / "docs" / page).read_text(encoding="utf-8")
     record = manifest(workbench)
     if page == "campaign.md":
-        from workbench.campaign import figure_spec, spec
+        from workbench.campaign import figure_spec, motion_spec, spec
 
         models = [
             spec.Campaign, spec.CaseSpec, spec.CandidateSpec, spec.ClaimSpec, spec.Measure, figure_spec.FigureSpec,
-            spec.SineMotion, spec.MultiSineMotion, spec.CycleMotion, spec.CsvMotion,
+            *motion_spec.MOTIONS.values(),
         ]  # fmt: skip
         keys = {key for model in models for key in model.model_fields}
     else:

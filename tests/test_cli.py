@@ -57,7 +57,7 @@ def test_a_run_from_outside(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (None, "workbench: small.toml: no such campaign file\n"),
+        (None, "workbench: small.toml: no such campaign file; those that come along: "),
         (SMALL.replace("0.06, 4.0", "0.6, 4.0", 1), 'case "first": t = 0.05 s, joint q1: |q1| exceeds the rod length'),
     ],
     ids=["missing", "out of the workspace"],
@@ -99,7 +99,7 @@ def test_ctrl_c_leaves_the_earlier_run_and_nothing_else(workbench: Workbench) ->
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["run"], "Missing argument 'CAMPAIGN'."),
+        (["run"], "which CAMPAIGN? A TOML file, or one that comes along: almeida_2010"),
         (["run", "a.toml", "b.toml"], "(b.toml)"),
         (["run", "small.toml", "--bogus"], "No such option: --bogus"),
         (["run", "small.toml", "--out"], "Option '--out' requires an argument."),

@@ -372,18 +372,6 @@ CRANK = """<body name="crank"><joint name="q" axis="0 1 0" {}/><inertial pos=".1
 GEARED = '<joint joint1="r" joint2="q"/>'
 
 
-@pytest.mark.parametrize(
-    ("driven", "passive", "message"),
-    [
-        ("", 'frictionloss="0.5"', 'joint "r" is passive and has frictionloss 0.5'),
-        ('damping="1 2"', "", 'joint "q" has damping 1 and further terms'),
-    ],
-)
-def test_the_reference_refuses_what_it_leaves_out(tmp_path: Path, driven: str, passive: str, message: str) -> None:
-    with pytest.raises(ModelError, match=message):
-        wb.MujocoReference(write_model(tmp_path, CRANK.format(driven, passive), GEARED))
-
-
 @pytest.mark.parametrize("flag", ["damper", "frictionloss"])
 def test_friction_that_mujoco_is_told_to_ignore_is_refused(tmp_path: Path, flag: str) -> None:
     path = spoiled_model(tmp_path, '<flag contact="disable"/>', f'<flag contact="disable" {flag}="disable"/>')

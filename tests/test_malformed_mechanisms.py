@@ -15,7 +15,7 @@ LINK = """<body pos="0.3 0 0"><joint name="fifth" axis="0 -1 0"/><geom size=".01
 GROUND = '<site name="ground" pos="0.5 0 0"/>'
 
 MALFORMED: dict[str, tuple[tuple[str, str], tuple[str, str], str]] = {
-    "loop that cannot close": ((GROUND, GROUND.replace("0.5", "2.5")), ("", ""), 'equality "loop" stays open by'),
+    "loop that cannot close": ((GROUND, GROUND.replace("0.5", "2.5")), ("", ""), 'equality "loop" is open by'),
     "actuated joint misspelt": (("", ""), ('["crank"]', '["crnk"]'), '"crnk": no such joint; did you mean "crank"?'),
     "unactuated freedom": (
         (TIP, LINK),

@@ -14,7 +14,8 @@ import pytest
 
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, WorkbenchError
-from workbench.mjcf.safety import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
+from workbench.mjcf.files import MAX_BYTES
+from workbench.mjcf.safety import MAX_DEPTH, MAX_ELEMENTS
 from workbench.reference.check import check_model
 from workbench.robots.edit import edit_file
 from workbench.robots.load import load_model, open_model
@@ -37,18 +38,20 @@ def inside(section: str, extra: str) -> str:
 
 
 HOSTILE: dict[str, tuple[str, str]] = {
-    "include": (inside("worldbody", '<include file="other.xml"/>'), "<include> reads another file"),
-    "include, absolute": (inside("asset", '<include file="/etc/passwd"/>'), "<include> reads another file"),
-    "mesh": (inside("asset", '<mesh name="m" file="../m.stl"/>'), "reads another file"),
-    "mesh beside the model": (inside("asset", '<mesh name="m" file="m.stl"/>'), "reads another file"),
-    "mesh, name written with character references": (inside("asset", '<mesh file="&#x2e;./m.stl"/>'), "reads another file"),
-    "texture": (inside("asset", '<texture type="2d" file="t.png"/>'), "reads another file"),
-    "cube texture": (inside("asset", '<texture type="cube" fileright="t.png"/>'), "reads another file"),
-    "height field": (inside("asset", '<hfield name="h" file="h.png" size="1 1 1 1"/>'), "reads another file"),
-    "model in a model": (inside("asset", '<model name="m" file="m.xml"/>'), "reads another model"),
-    "attach": (inside("worldbody", '<attach model="m" body="b" prefix="p"/>'), "from another model"),
+    "include, missing": (inside("worldbody", '<include file="other.xml"/>'), "no such file"),
+    "include, absolute": (inside("asset", '<include file="/etc/passwd"/>'), "an absolute path"),
+    "include, above": (inside("asset", '<include file="../other.xml"/>'), "outside the model's own folder"),
+    "include of itself": (inside("worldbody", '<include file="model.xml"/>'), "model.xml"),
+    "include without a name": (inside("worldbody", "<include/>"), "no file is named"),
+    "mesh that weighs": (inside("worldbody", '<body><joint/><geom type="mesh" mesh="m"/></body>').replace("<asset>", '<asset><mesh name="m" file="../m.stl"/>'), "has its mass from it"),
+    "mesh of a device": (inside("worldbody", '<body><joint/><geom type="mesh" mesh="m"/></body>').replace("<asset>", '<asset><mesh name="m" file="/dev/zero"/>'), "an absolute path"),
+    "model in a model": (inside("asset", '<model name="m" file="m.xml"/>'), "no such file"),
+    "model, absolute": (inside("asset", '<model name="m" file="/etc/passwd"/>'), "an absolute path"),
+    "attach from nothing": (inside("worldbody", '<attach model="m" body="b" prefix="p"/>'), "attach"),
+    "file where none is read": (inside("worldbody", '<site file="x"/>'), "reads another file"),
+    "replicate bomb": (inside("worldbody", '<replicate count="100000" sep="1 0 0"><geom size="1"/></replicate>'), "<geom> makes more than 20000"),
+    "nested replicate bomb": (inside("worldbody", '<replicate count="200" sep="1 0 0"><replicate count="200"><geom size="1"/></replicate></replicate>'), "makes more than 20000"),
     "skin": (inside("asset", '<skin name="s" file="s.skn"/>'), "deformable"),
-    "mesh directory": (TEXT.replace("<compiler ", '<compiler meshdir="/etc" '), "reads another file"),
     "plugin": (inside("actuator", '<plugin joint="q1" plugin="mujoco.pid"/>'), "loads code"),
     "extension": (TEXT.replace("<option", '<extension><plugin plugin="mujoco.sdf.gear"/></extension><option', 1), "loads code"),
     "urdf": ('<robot name="r"><link name="l"/></robot>', "begins with <mujoco>"),
@@ -60,7 +63,6 @@ HOSTILE: dict[str, tuple[str, str]] = {
     "deep nesting": (inside("worldbody", "<body>" * 5000 + "</body>" * 5000), "nest deeper"),
     "deep nesting never closed": ("<mujoco>" + "<body>" * 1_000_000, "nest deeper"),
     "many elements": (inside("worldbody", '<site pos="0 0 0"/>' * (MAX_ELEMENTS + 1)), "more than"),
-    "replicate bomb": (inside("worldbody", '<replicate count="100000" sep="1 0 0"><geom size="1"/></replicate>'), "<replicate>"),
     "composite bomb": (inside("worldbody", '<composite type="cable" count="1000000 1 1" size="1"/>'), "<composite>"),
     "flex bomb": (inside("worldbody", '<flexcomp name="f" count="999 999 999" dim="3"/>'), "<flexcomp>"),
     "texture bomb": (inside("asset", '<texture type="2d" builtin="flat" width="100000" height="100000"/>'), "at most 4096"),
@@ -135,9 +137,9 @@ def test_hostile_models_are_one_line(
 
 def test_a_refused_reference_to_another_file_names_its_line(tmp_path: Path) -> None:
     path = tmp_path / "model.xml"
-    path.write_text(HOSTILE["mesh"][0])
-    line = next(i for i, row in enumerate(path.read_text().split("\n"), start=1) if "../m.stl" in row)
-    with pytest.raises(ModelError, match=f'model.xml:{line}: <mesh file="../m.stl"> reads another file'):
+    path.write_text(HOSTILE["include, above"][0])
+    line = next(i for i, row in enumerate(path.read_text().split("\n"), start=1) if "../other.xml" in row)
+    with pytest.raises(ModelError, match=f'model.xml:{line}: <include file="../other.xml">: lies outside'):
         load_model(path)
 
 
@@ -224,7 +226,7 @@ def test_impossible_names_are_one_line(name: str, tmp_path: Path, monkeypatch: p
 @pytest.mark.parametrize("name", ["models/../pyproject.toml", "models/../../etc/passwd", "models/none.xml", "models/"])
 def test_a_bundled_name_does_not_lead_elsewhere(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ModelError, match="no such model file"):
+    with pytest.raises(ModelError, match=r"no such (robot or )?model file"):
         load_model(name)
 
 

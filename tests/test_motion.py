@@ -7,7 +7,6 @@ import math
 import subprocess
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ from scipy.integrate import cumulative_simpson
 
 from workbench import motion
 from workbench.errors import MotionError
-from workbench.motion import JointMotion, PickAndPlace, PlatformMotion, from_csv, multi_sine, sine, time_grid
+from workbench.motion import JointMotion, PickAndPlace, PlatformMotion, multi_sine, sine, time_grid
 
 UP = (0.0, 0.0, -1.0)
 """away from the ground where x3 points down"""
@@ -440,14 +439,14 @@ def test_pick_and_place_samples_the_whole_cycle() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"pick": (0, 0)}, "pick and place: pick has 2 entries; allowed: 3"),
-        ({"place": (0, math.nan, 0)}, "pick and place: place, entry 2 = nan m; allowed: a finite number"),
+        ({"pick": (0, 0)}, "pick and place: pick has 2 entries; allowed: 3, the task coordinates x, y, z"),
+        ({"place": (0, math.nan, 0)}, "pick and place: place, entry 2 = nan; allowed: a finite number"),
         ({"lift": 0.0}, "pick and place: lift = 0 m; allowed: > 0"),
         ({"lift": "high"}, "pick and place: lift = 'high'; allowed: a number"),
         ({"up": None}, "pick and place: lift = 0.06 m without up; allowed: a height with up, or a vector"),
-        ({"up": (0, 0, 0)}, "pick and place: up = (0, 0, 0); allowed: a direction, of any length but zero"),
+        ({"up": (0, 0, 0)}, "pick and place: up is all zeros; allowed: a direction, of any length but zero"),
         ({"lift": (0, 0, 1)}, "pick and place: lift is a vector and up is given too; allowed: a height with up"),
-        ({"lift": (0, 0, 0), "up": None}, "pick and place: lift = (0, 0, 0) m; allowed: a vector that is not zero"),
+        ({"lift": (0, 0, 0), "up": None}, "pick and place: lift is all zeros; allowed: a vector that is not zero"),
         ({"lift_time": 0.0}, "pick and place: lift_time = 0 s; allowed: > 0"),
         ({"traverse_time": -1.0}, "pick and place: traverse_time = -1 s; allowed: > 0"),
         ({"lower_time": math.inf}, "pick and place: lower_time = inf s; allowed: > 0"),
@@ -472,217 +471,6 @@ def test_cycle_refusals(changes: dict, message: str) -> None:
 def test_cycle_that_overflows_is_refused() -> None:
     with pytest.raises(MotionError, match=r"^xd+[123] at t = 5e-201 s is -?(inf|nan); allowed: a finite number$"):
         dataclasses.replace(CYCLE, lift_time=1e-200, overlap=0.0).sample([0.5e-200])
-
-
-# --- CSV --------------------------------------------------------------------------------------------------------------
-
-
-def written(path: Path, moved: JointMotion, derivatives: bool) -> Path:
-    """Write a motion with all its digits."""
-    groups = {"q": moved.q, "qd": moved.qd, "qdd": moved.qdd} if derivatives else {"q": moved.q}
-    header = ["t", *(f"{name}{joint + 1}" for name, array in groups.items() for joint in range(array.shape[1]))]
-    rows = np.column_stack([moved.t, *groups.values()])
-    path.write_text("\n".join([",".join(header), *(",".join(map(repr, row)) for row in rows.tolist())]) + "\n")
-    return path
-
-
-@pytest.fixture
-def smooth() -> JointMotion:
-    return multi_sine(time_grid(0.1, 2.1, samples=801), OFFSET, TERMS)
-
-
-def test_csv_with_derivatives_comes_back_bit_for_bit(tmp_path: Path, smooth: JointMotion) -> None:
-    back = from_csv(written(tmp_path / "m.csv", smooth, derivatives=True))
-    for name in ("t", "q", "qd", "qdd"):
-        np.testing.assert_array_equal(getattr(back, name), getattr(smooth, name))
-
-
-def test_csv_spline_has_the_documented_accuracy(tmp_path: Path) -> None:
-    """Orders 6 and 4 inside, and the figures of the docstring, for 50 and 200 samples per period."""
-    errors = {}
-    for per_period in (50, 200):
-        exact = sine(time_grid(0, 4 * math.pi, samples=2 * per_period + 1), [0.0], [1.0], [1.0], [0.7])
-        back = from_csv(written(tmp_path / "m.csv", exact, derivatives=False), columns=["q1"])
-        np.testing.assert_allclose(back.q, exact.q, atol=1e-15)
-        inside = slice(per_period // 2, -per_period // 2)
-        errors[per_period] = [
-            np.abs(getattr(back, name) - getattr(exact, name))[part].max()
-            for name in ("qd", "qdd")
-            for part in (inside, slice(None))
-        ]
-    velocity, _, acceleration, acceleration_ends = np.log(np.divide(errors[50], errors[200])) / math.log(4)
-    assert velocity == pytest.approx(6, abs=0.2)
-    assert acceleration == pytest.approx(4, abs=0.2)
-    assert acceleration_ends == pytest.approx(4, abs=0.3)
-    assert errors[50][2] < 4e-7
-    assert errors[50][3] < 1.2e-4
-    assert errors[200][2] < 2e-9
-    assert errors[200][3] < 5e-7
-
-
-def test_csv_spline_of_a_quintic_polynomial_is_exact(tmp_path: Path) -> None:
-    """On an uneven grid far from t = 0; a degree-6 term is what a quintic spline cannot hold."""
-    t = 1000.0 + time_grid(0, 2, samples=15) ** 1.3
-    for sixth, expected_exact in ((0.0, True), (0.5, False)):
-        p = Polynomial([1, -2, 0.5, 0.3, -0.2, 0.1, sixth])
-        value, first, second = (p.deriv(order)(t - 1000.0) if order else p(t - 1000.0) for order in range(3))
-        exact = JointMotion(t, value[:, None], first[:, None], second[:, None])
-        back = from_csv(written(tmp_path / "m.csv", exact, derivatives=False), columns=["q1"])
-        assert (gap(back.qdd, exact.qdd) < 1e-9) is expected_exact
-
-
-@pytest.mark.parametrize("derivatives", [True, False])
-def test_csv_is_resampled(tmp_path: Path, smooth: JointMotion, derivatives: bool) -> None:
-    path = written(tmp_path / "m.csv", smooth, derivatives)
-    grid = time_grid(0.1, 2.1, samples=1237)
-    back, exact = from_csv(path, t=grid), multi_sine(grid, OFFSET, TERMS)
-    np.testing.assert_array_equal(back.t, grid)
-    for name, tolerance in (("q", 1e-10), ("qd", 1e-7), ("qdd", 1e-4)):
-        assert gap(getattr(back, name), getattr(exact, name)) < tolerance
-    wrong = multi_sine(grid + 1e-3, OFFSET, TERMS)
-    assert gap(back.q, wrong.q) > 1e-4
-
-
-def test_resampled_quintic_takes_what_was_given(tmp_path: Path) -> None:
-    """Given derivatives that do not fit the positions are kept at the samples, and the figure says so."""
-    rng = np.random.default_rng(1)
-    given_motion = JointMotion(np.array([0.0, 0.5, 2.0]), *rng.standard_normal((3, 3, 3)))
-    path = written(tmp_path / "m.csv", given_motion, derivatives=True)
-    back = from_csv(path, t=given_motion.t)
-    for name in ("q", "qd", "qdd"):
-        np.testing.assert_allclose(getattr(back, name), getattr(given_motion, name), atol=1e-13)
-    assert from_csv(path).consistency().velocity.max() > 0.1
-    # twice continuously differentiable: no jump across the inner sample
-    around = from_csv(path, t=[0.5 - 1e-9, 0.5 + 1e-9])
-    np.testing.assert_allclose(around.qdd[0], around.qdd[1], atol=1e-6)
-
-
-def test_csv_may_have_any_column_order_comments_blanks_and_a_byte_order_mark(tmp_path: Path) -> None:
-    path = tmp_path / "m.csv"
-    rows = "".join(f"{k} , {k / 10},1,2\n\n# between\n" for k in range(6))
-    path.write_text(f"\ufeff# made by hand\n q2,t, q1,q3\n{rows}", encoding="utf-8")
-    back = from_csv(path)
-    np.testing.assert_allclose(back.t, np.arange(6) / 10)
-    np.testing.assert_allclose(back.qd, [[0, 10, 0]] * 6, atol=1e-10)
-
-
-HEAD = "t,q1,q2,q3\n"
-GOOD = "".join(f"{k},0,0,0\n" for k in range(6))
-ALL_OR_NONE = "t,q1,q2,q3 with all or none of qd1,qd2,qd3,qdd1,qdd2,qdd3"
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", f"no header line; allowed: {ALL_OR_NONE}"),
-        ("t,q1,q2,qq3\n", 'line 1: unknown column "qq3"; did you mean "q3"?'),
-        (
-            "t,q1,q2,q3,torque\n",
-            'line 1: unknown column "torque"; valid: q1, q2, q3, qd1, qd2, qd3, qdd1, qdd2, qdd3, t',
-        ),
-        ("#\nt,q1,q2\n", f'line 2: column "q3" is missing; allowed: {ALL_OR_NONE}'),
-        ("q1,q2,q3\n", f'line 1: column "t" is missing; allowed: {ALL_OR_NONE}'),
-        ("t,q1,q2,q3,qd1,qd2,qd3\n", f'line 1: column "qdd1" is missing; allowed: {ALL_OR_NONE}'),
-        ("t,q1,q2,q3,q1\n", 'line 1: column "q1" stands 2 times; allowed: once'),
-        ("t;q1;q2;q3\n", None),
-        (
-            "x" * 100 + "\n",
-            f'line 1: unknown column "{"x" * 40}..."; allowed: commas, semicolons or tabs between names',
-        ),
-        (HEAD + "0,0,0\n", "line 2: 3 cells; allowed: 4, as in the header"),
-        (HEAD + "0,0,zero,0\n", 'line 2, column q2: "zero"; allowed: a finite number'),
-        (HEAD + "\n0,0,,0\n", 'line 3, column q2: ""; allowed: a finite number'),
-        (HEAD + "0,0,0,nan\n", 'line 2, column q3: "nan"; allowed: a finite number'),
-        (HEAD + "0,inf,0,0\n", 'line 2, column q1: "inf"; allowed: a finite number'),
-        (HEAD + "0,1_0,0,0\n", 'line 2, column q1: "1_0"; allowed: a finite number'),
-        (HEAD + "0,\x1b[31m,0,0\n", 'line 2, column q1: "\\x1b[31m"; allowed: a finite number'),
-        (HEAD + GOOD + "5,0,0,0\n", "line 8, column t: 5 s after 5 s; allowed: strictly increasing"),
-        (HEAD + GOOD + "4.5,0,0,0\n", "line 8, column t: 4.5 s after 5 s; allowed: strictly increasing"),
-        (HEAD + GOOD[:-8], "5 samples; allowed: at least 6 without qd and qdd columns"),
-        (HEAD, "0 samples; allowed: at least 6 without qd and qdd columns"),
-        ("t,q1,q2,q3,qd1,qd2,qd3,qdd1,qdd2,qdd3\n", "0 samples; allowed: at least 1 of any file"),
-        (HEAD + '0,"' + "1" * 200000 + '",0,0\n', "line 2: field larger than field limit (131072)"),
-        (HEAD + "0,0,0,0\r1,0,0,0\n", None),
-        (
-            "t,q1,q2,q3\n" + "".join(f"{k}e-200,{k % 2},0,0\n" for k in range(5)) + "1,0,0,0\n",
-            "spline: time steps from 1e-200 s to 1 s are too uneven; allowed: steps of similar size",
-        ),
-    ],
-)
-def test_csv_refusals_name_file_line_column_and_value(tmp_path: Path, text: str, message: str | None) -> None:
-    path = tmp_path / "m.csv"
-    path.write_bytes(text.encode())
-    with pytest.raises(MotionError) as caught:
-        from_csv(path)
-    found = str(caught.value)
-    assert found.startswith(f"{path}: ")
-    assert "\n" not in found
-    assert caught.value.facts["file"] == str(path)
-    if message is not None:
-        assert found == f"{path}: {message}"
-
-
-def test_spline_that_misses_its_own_samples_is_refused(tmp_path: Path) -> None:
-    """Steps graded over many decades: SciPy returns a spline without a word, and it does not pass its samples."""
-    rng = np.random.default_rng(0)
-    for decades, refused in ((2, False), (12, True)):
-        t = np.cumsum(10.0 ** rng.uniform(-decades, 0, 40))
-        samples = JointMotion(t, *(rng.standard_normal((40, 1)) for _ in range(3)))
-        path = written(tmp_path / "m.csv", samples, derivatives=False)
-        if refused:
-            with pytest.raises(MotionError, match=r"m\.csv: spline: time steps from \S+ s to \S+ s are too uneven"):
-                from_csv(path, columns=["q1"])
-        else:
-            np.testing.assert_allclose(from_csv(path, columns=["q1"]).q, samples.q, atol=1e-11)
-
-
-def test_csv_refusal_keeps_the_facts(tmp_path: Path) -> None:
-    path = tmp_path / "m.csv"
-    path.write_text(HEAD + "0,0,zero,0\n")
-    with pytest.raises(MotionError) as caught:
-        from_csv(path)
-    assert caught.value.facts == {"file": str(path), "line": 2, "column": "q2", "value": "zero"}
-
-
-def test_csv_files_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(MotionError, match=r"none\.csv: cannot be read: No such file or directory$"):
-        from_csv(tmp_path / "none.csv")
-    with pytest.raises(MotionError, match=r"cannot be read: Is a directory$"):
-        from_csv(tmp_path)
-    with pytest.raises(MotionError, match=r"cannot be read: embedded null"):
-        from_csv("a\0b")
-    (tmp_path / "latin.csv").write_bytes(HEAD.encode() + b"0,\xe9,0,0\n")
-    with pytest.raises(MotionError, match=r"latin\.csv: not UTF-8 text \(byte \d+\)$"):
-        from_csv(tmp_path / "latin.csv")
-
-
-def test_csv_with_more_samples_than_allowed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "m.csv"
-    path.write_text(HEAD + GOOD)
-    monkeypatch.setattr("workbench.motion.table.MAX_SAMPLES", 6)
-    assert len(from_csv(path).t) == 6
-    monkeypatch.setattr("workbench.motion.table.MAX_SAMPLES", 5)
-    with pytest.raises(MotionError, match=r"m\.csv: line 7: more samples than allowed: 5$"):
-        from_csv(path)
-
-
-def test_csv_is_not_extrapolated(tmp_path: Path) -> None:
-    path = tmp_path / "m.csv"
-    path.write_text(HEAD + GOOD)
-    for grid, moment in (([-0.1, 1.0], "-0.1"), ([1.0, 5.1], "5.1")):
-        with pytest.raises(MotionError) as caught:
-            from_csv(path, t=grid)
-        assert str(caught.value) == f"{path}: t = {moment} s is outside the file; allowed: 0 s to 5 s"
-    path.write_text("t,q1,qd1,qdd1\n1,0,0,0\n")
-    assert len(from_csv(path, columns=["q1"]).t) == 1
-    with pytest.raises(MotionError, match=r"1 samples; allowed: at least 2 to resample$"):
-        from_csv(path, columns=["q1"], t=[1.0])
-
-
-@pytest.mark.parametrize("columns", ["q1", [], [""], ["q1", "q1"], ["q1", "qd1"], ["a", "a_d"], ["t"]])
-def test_csv_column_names_that_cannot_work(columns: list[str]) -> None:
-    with pytest.raises(MotionError, match=r"^columns = .*; allowed: "):
-        from_csv("m.csv", columns=columns)
 
 
 # --- the package ------------------------------------------------------------------------------------------------------

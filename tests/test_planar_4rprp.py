@@ -26,8 +26,8 @@ from planar_4rprp_cases import (
     second_rate,
     slow,
 )
+from workbench.capabilities.load import load_robot as load_mechanism
 from workbench.capabilities.robot import Robot
-from workbench.capabilities.robot import load_robot as load_mechanism
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.robots import screws
 from workbench.robots.planar_4rprp import screws as screw_route

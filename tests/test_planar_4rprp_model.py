@@ -14,8 +14,8 @@ from planar_4rprp_cases import (
     random_parameters,
     scattered,
 )
+from workbench.capabilities.load import load_robot as load_mechanism
 from workbench.capabilities.robot import Robot
-from workbench.capabilities.robot import load_robot as load_mechanism
 from workbench.errors import MotionError, ParameterError
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.robots.load import load_model

@@ -71,7 +71,7 @@ def disguise(run: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (truncate("pictures/pictures.json"), "pictures.json: not a record of pictures"),
+        (truncate("pictures/pictures.json"), "pictures.json: not valid JSON"),
         (replace("pictures/pictures.json", '"format": 1', '"format": 2'), "format 2 is not supported; allowed: 1"),
         (replace("pictures/pictures.json", '"sim1"', '"sim7"'), "case 'sim7' with 5 frames; needed: a case of the run"),
         (replace("pictures/pictures.json", '"columns": 2', '"columns": 0'), "needed: a case of the run"),

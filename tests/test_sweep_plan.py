@@ -84,7 +84,7 @@ def test_keys_change_what_they_name(tmp_path: Path) -> None:
         ]""",
     )
     case = found.case_dict(0)
-    base = found.mechanism.parameters
+    base = found.robot.parameters
     expected = {"a2_left": base.a2_left * 1.1, "a2_right": base.a2_right * 1.1, "m1_left": 0.7}
     assert case["parameters"] == expected
     assert case["motion"]["amplitude"] == [0.08, 0.11, 0.2]
@@ -101,7 +101,7 @@ def test_a_case_of_its_own_is_changed_too(tmp_path: Path) -> None:
     found = plan(
         tmp_path, 'method = "list"\nvary = [{ key = "parameters.m2", values = [2.0], relative = true }]', m1=0.9
     )
-    assert found.mechanism.parameters.m1_left == 0.9
+    assert found.robot.parameters.m1_left == 0.9
     assert found.case_dict(0)["parameters"] == {"m2_left": 0.6, "m2_right": 0.6}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import json
 import os
 import random
@@ -385,22 +386,24 @@ def test_the_lock_of_a_dead_run_holds_nobody_off(workbench: Workbench, inline: t
 
 
 def test_a_full_disk(workbench: Workbench, calm: Path, inline: type[Inline], monkeypatch: pytest.MonkeyPatch) -> None:
-    room, pwrite = [9000], os.pwrite
+    room = [9000]
 
-    def full(descriptor: int, data: bytes, place: int) -> int:
-        if room[0] <= 0:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        written = pwrite(descriptor, data[: room[0]], place)
-        room[0] -= written
-        return written
+    class Full(io.FileIO):
+        def write(self, data: Any) -> int:
+            if room[0] <= 0:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            written = super().write(data[: room[0]])
+            room[0] -= written
+            return written
 
-    monkeypatch.setattr(os, "pwrite", full)
+    fdopen = os.fdopen
+    monkeypatch.setattr(os, "fdopen", lambda descriptor, mode, buffering=-1: Full(descriptor, mode))
     done = workbench("run", "small.toml", "--out", "run")
     assert done.code == 2
     assert len(done.complaint) == 1
     assert "No space left on device; " in done.complaint[0]
     assert "of 10 cases were finished before and are kept" in done.complaint[0]
-    monkeypatch.setattr(os, "pwrite", pwrite)
+    monkeypatch.setattr(os, "fdopen", fdopen)
     kept = int(done.complaint[0].split("; ")[1].split(" of")[0])
     assert 0 < kept < 10
     assert workbench("run", "small.toml", "--out", "run").code == 0

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from urdf_pinocchio import pinocchio_torques
-from workbench.capabilities.robot import load_robot
+from workbench.capabilities.load import load_robot
 from workbench.cli import app
 from workbench.errors import ModelError
 from workbench.mjcf.loop_table import Loop, LoopTable, read_loops

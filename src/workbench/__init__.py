@@ -15,8 +15,11 @@ from typing import TYPE_CHECKING, Any
 from workbench._version import __version__
 
 if TYPE_CHECKING:
-    from workbench.capabilities.robot import Robot, load_robot
-    from workbench.capabilities.robot import load_robot as load_mechanism
+    from workbench.capabilities.load import load_robot
+    from workbench.capabilities.load import load_robot as load_mechanism
+    from workbench.capabilities.robot import Robot
+    from workbench.diagnosis.surface import diagnose
+    from workbench.diagnosis.terms_frame import terms
     from workbench.errors import WorkbenchError
     from workbench.reference import MujocoReference
     from workbench.report.frames import load_run
@@ -28,19 +31,23 @@ __all__ = [
     "WorkbenchError",
     "__version__",
     "candidate",
+    "diagnose",
     "load_mechanism",
     "load_robot",
     "load_run",
+    "terms",
 ]
 
 _HOMES = {
     "MujocoReference": "workbench.reference",
     "WorkbenchError": "workbench.errors",
     "candidate": "workbench.robots.registration",
-    "load_mechanism": "workbench.capabilities.robot:load_robot",
-    "load_robot": "workbench.capabilities.robot",
+    "diagnose": "workbench.diagnosis.surface",
+    "load_mechanism": "workbench.capabilities.load:load_robot",
+    "load_robot": "workbench.capabilities.load",
     "Robot": "workbench.capabilities.robot",
     "load_run": "workbench.report.frames",
+    "terms": "workbench.diagnosis.terms_frame",
 }
 
 

@@ -1,18 +1,26 @@
 """The command line: parse, call, print.
 
-Exit code 0: every bound holds; 1: a bound fails; 2: bad input; 3: a fault of the workbench itself; 130: interrupted.
+Exit code 0: every bound holds; 1: a bound fails; 2: bad input; 3: a fault of the workbench itself; 130: interrupted;
+143, 129: ended by SIGTERM, SIGHUP.
 """
 
 from __future__ import annotations
 
+import io
 import os
+import re
+import signal
 import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Annotated, NoReturn
 
 import typer
 
 from workbench._version import __version__
 from workbench.commands.compare import compare
+from workbench.commands.diagnose import diagnose
 from workbench.commands.model import model
 from workbench.commands.new import new
 from workbench.commands.report import report
@@ -27,7 +35,6 @@ app = typer.Typer(
     name="workbench",
     help="Validate closed-form dynamics of parallel robots against MuJoCo.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
@@ -35,7 +42,13 @@ app = typer.Typer(
 BAD_INPUT = 2
 INTERNAL = 3
 INTERRUPTED = 130
+SIGNALLED = 128
+"""plus the number of the signal that ended a command"""
 BROKEN_PIPE = 141
+
+SHOWN = 200
+LONG_WORD = re.compile(r"\S{600,}")
+"""Nobody reads these to their end: a line of a message stays a line."""
 
 TRACEBACK = "WORKBENCH_TRACEBACK"
 """environment variable: when set, a fault of the workbench itself shows its traceback"""
@@ -66,6 +79,7 @@ app.command()(status)
 app.command()(workspace)
 app.add_typer(model)
 app.command()(compare)
+app.command()(diagnose)
 app.command()(watch)
 
 
@@ -73,14 +87,41 @@ def main() -> NoReturn:
     """Run the command line; whatever goes wrong becomes one line and an exit code."""
     if _notice not in subscribers:
         subscribers.append(_notice)
-    sys.exit(_run(sys.argv[1:] or ["--help"]))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # names of files may hold what is no text
+            stream.reconfigure(errors="backslashreplace")
+    with _asked_to_end() as asked:
+        code = _run(sys.argv[1:] or ["--help"], asked)
+    sys.exit(code)
+
+
+@contextmanager
+def _asked_to_end() -> Iterator[list[int]]:
+    """Make SIGTERM and SIGHUP end the command as Ctrl-C does, with everything tidied up; give those that came."""
+    came: list[int] = []
+
+    def end(number: int, frame: object) -> None:
+        signal.signal(number, signal.SIG_DFL)  # a second one ends it at once
+        came.append(number)
+        raise KeyboardInterrupt
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+        # who ignores a signal, as nohup does, goes on ignoring it
+        before = {n: signal.signal(n, end) for n in numbers if signal.getsignal(n) is signal.SIG_DFL}
+    try:
+        yield came
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _notice(text: str) -> None:
     typer.echo(f"workbench: {text}", err=True)
 
 
-def _run(arguments: list[str]) -> int:
+def _run(arguments: list[str], asked: Sequence[int] = ()) -> int:
     try:
         code = app(args=arguments, prog_name="workbench", standalone_mode=False)
     except (WorkbenchError, USAGE_ERROR) as error:
@@ -98,6 +139,8 @@ def _run(arguments: list[str]) -> int:
         if os.environ.get(TRACEBACK):
             raise
         return _complain(f"internal error, {type(error).__name__}: {error}; {TRACEBACK}=1 shows where", INTERNAL)
+    if asked:
+        return _complain(f"ended by {signal.Signals(asked[0]).name}", SIGNALLED + asked[0])
     if code == INTERRUPTED:
         return _complain("interrupted", INTERRUPTED)
     return int(code or 0)
@@ -105,7 +148,8 @@ def _run(arguments: list[str]) -> int:
 
 def _complain(what: object, code: int) -> int:
     message = what.format_message() if hasattr(what, "format_message") else str(what)
-    typer.echo(f"workbench: {' '.join(message.split())}", err=True)
+    line = LONG_WORD.sub(lambda word: f"{word[0][:SHOWN]}...", " ".join(message.split()))
+    typer.echo(f"workbench: {line}", err=True)
     return code
 
 

@@ -7,13 +7,29 @@ use after installation therefore takes a while, once; a notice (`workbench.notic
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba import njit
-
 from workbench.notices import tell
+from workbench.shielded import shielded
+
+WITHOUT_COMPILER = "NUMBA_DISABLE_JIT"
+"""environment variable for debugging; neither the kernels nor numba's own parts work with it"""
+
+if os.environ.get(WITHOUT_COMPILER, "0") != "0":
+    del os.environ[WITHOUT_COMPILER]
+    tell(f"{WITHOUT_COMPILER} is not heeded: the kernels need machine code")
+
+with shielded():
+    from numba import config, float64, njit, types
+
+# numba looks for this file of the current directory again before it compiles
+if hasattr(config, "_config_fname"):
+    config._config_fname = str(Path(__file__).parent / "no_numba_config")
+
+__all__ = ["compiled", "float64", "inlined", "types"]
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 """IEEE arithmetic throughout, no fast-math: NaN stays NaN, and a sample's result does not depend on whether it was
@@ -30,7 +46,7 @@ KERNEL_FILES = (
         for path in sorted(ROOT.glob(f"robots/*/{name}.py"))
     ),
     *(f"robots/{name}.py" for name in ("blocks", "sine_cosine")),
-    *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "structure", "tables")),
+    *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "kinds", "tables", "frames")),
     *(f"reference/{name}.py" for name in ("task_rows", "platform_kernels")),
 )
 """What machine code is made of. A kernel calls into other files, and its cache must not outlive a change in those."""

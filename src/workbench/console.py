@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -37,6 +38,9 @@ from workbench.campaign.verdict import (
 
 WIDE = 110
 """Columns of a table where there is no terminal to ask, in a log for instance."""
+
+LINE_EVERY_S = 10.0
+"""Seconds between lines of progress where there is no terminal."""
 
 SEEN_AS_PERCENT = 1e-6
 """Smaller errors show as powers of ten also among percentages."""
@@ -88,6 +92,43 @@ class CaseProgress:
             err.print(f"[{number + 1}/{total}] {case}", markup=False)
 
 
+class Steps:
+    """Steps of something that may take a while: a bar on a terminal, a line now and then elsewhere.
+
+    *what* is said beside it: ``drawing figures``.
+    """
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._said = time.monotonic()
+        self._bar = Progress(
+            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+            console=err, transient=True, disable=not err.is_terminal,
+        )  # fmt: skip
+        self._task: Any = None
+
+    def __enter__(self) -> Self:
+        """Start the bar."""
+        self._bar.start()
+        self._task = self._bar.add_task(self._what, total=None)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Take the bar away."""
+        self._bar.stop()
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show that so many steps are done."""
+        now = time.monotonic()
+        if err.is_terminal:
+            self._bar.update(self._task, completed=done, total=total)
+        elif now - self._said > LINE_EVERY_S:
+            self._said = now
+            err.print(f"[{done}/{total}] {self._what}", markup=False)
+
+
 def print_outcome(outcome: Outcome) -> None:
     """Print the table of errors, the claims, the verdict and where the report lies."""
     manifest = outcome.manifest
@@ -117,6 +158,7 @@ def print_outcome(outcome: Outcome) -> None:
     for claim in refuted:
         measured, claimed = _quantity(claim["measured"], claim["unit"]), _quantity(claim["claimed"], claim["unit"])
         out.print(Text(f"  not confirmed: {claim['text']}: measured {measured}, printed {claimed} ({claim['source']})"))
+    _print_diagnosis(manifest.get("diagnosis", {}))
     out.print(_verdict(outcome))
     out.print(Text(f"Report: {outcome.directory / 'report.html'}"), soft_wrap=True)
 
@@ -130,6 +172,17 @@ def _print_recorded(manifest: dict[str, Any]) -> None:
             out.print(Text(f"  {label}: {record['sentence']}"), soft_wrap=True)
             for note in record["notes"]:
                 out.print(Text(f"  {label}: {note}"), style="dim", soft_wrap=True)
+
+
+def _print_diagnosis(diagnosis: dict[str, Any]) -> None:
+    """Say of each failing formula what is wrong with it, and the command that says more."""
+    for candidate, found in diagnosis.items():
+        if not found["findings"]:
+            continue
+        out.print(Text(f'What is wrong with "{candidate}":', style="bold"))
+        for sentence in found["findings"]:
+            out.print(Text(f"  - {sentence}"))
+        out.print(Text(f"  {found['command']}", style="dim"), soft_wrap=True)
 
 
 def _verdict(outcome: Outcome) -> Text:

@@ -14,7 +14,11 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from workbench.errors import SpecError, did_you_mean
+from workbench.reading import read_bytes
 from workbench.schema import NAME_RULE
+
+LARGEST_BYTES = 10_000_000
+"""A document larger than this is refused before it is parsed."""
 
 SHOWN = 60
 """Longest piece of a document's text that a message repeats."""
@@ -35,12 +39,13 @@ def read_toml(path: Path, shown: str) -> dict[str, Any]:
     """
     try:
         # -sig: some editors begin UTF-8 files with a byte order mark
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = read_bytes(path, LARGEST_BYTES).decode("utf-8-sig")
+        return tomllib.loads(text.replace("\r\n", "\n").replace("\r", "\n"))
     except OSError as error:
         raise SpecError(f"{shown}: {error.strerror or error}", file=shown) from error
     except UnicodeDecodeError as error:
         raise SpecError(f"{shown}: not UTF-8 text (byte {error.start})", file=shown) from error
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # also a number of more digits than Python reads
         raise SpecError(f"{shown}: not valid TOML: {error}", file=shown) from error
     except RecursionError as error:
         raise SpecError(f"{shown}: not valid TOML: nested too deeply", file=shown) from error
@@ -80,7 +85,7 @@ class Form:
         message = issue["msg"].removeprefix("Value error, ").removeprefix("Input ")
         # a whole table or list says less than its key
         shown = "" if isinstance(issue["input"], dict | list) else f" = {shorten(repr(issue['input']))}"
-        return f"{where}{shown}: {message[0].lower()}{message[1:]}"
+        return f"{where}{shown}: {message[0].lower()}{message[1:]}" if where else f"{message[0].lower()}{message[1:]}"
 
     def _wrong_kind(self, table: Any) -> str:
         if not isinstance(table, dict):

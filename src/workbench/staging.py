@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -12,9 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.errors import OutputError
+from workbench.reading import read_json
 
 IGNORED = (".DS_Store", "Thumbs.db", "desktop.ini")
 """files that file managers leave everywhere"""
+
+
+STAGE, OLD, EARLIER = "stage", "old", "earlier"
+RANDOM = re.compile(r"[a-z0-9_]{8}")
+"""how `tempfile` ends a name"""
 
 
 @dataclass(frozen=True)
@@ -83,7 +89,7 @@ def _check_existing(directory: Path, place: Path, kind: DirectoryKind) -> None:
 def _is_ours(marker: Path, kind: DirectoryKind) -> bool:
     """Tell our marker from other files of that common name."""
     try:
-        content = json.loads(marker.read_text(encoding="utf-8"))
+        content = read_json(marker)
     except (OSError, ValueError):
         return False
     return isinstance(content, dict) and kind.keys <= content.keys()
@@ -95,8 +101,15 @@ def _refused(directory: Path, error: Exception) -> OutputError:
 
 
 @contextmanager
-def staged(directory: Path) -> Iterator[Path]:
+def staged(directory: Path, alone: bool = False) -> Iterator[Path]:
     """Give a directory to write into; move it to its place when the block ends well, remove it when it does not.
+
+    Parameters
+    ----------
+    directory
+        Its place.
+    alone
+        Nobody else writes there, since the caller holds the place's lock: what a killed process left is tidied up.
 
     Raises
     ------
@@ -104,10 +117,12 @@ def staged(directory: Path) -> Iterator[Path]:
         The system refuses a write, with its own reason.
     """
     made: list[Path] = []
+    if alone:
+        recover(directory)
     try:
         place = directory.resolve()
         made = _make_parents(place)
-        stage = Path(tempfile.mkdtemp(prefix=f".{place.name[:100]}.", dir=place.parent))
+        stage = Path(tempfile.mkdtemp(prefix=_beside(place, STAGE), dir=place.parent))
     except (OSError, RuntimeError, ValueError) as error:
         _remove_empty(made)
         raise _refused(directory, error) from error
@@ -120,6 +135,39 @@ def staged(directory: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(stage, ignore_errors=True)
         _remove_empty(made)
+
+
+def _beside(place: Path, kind: str) -> str:
+    return f".{place.name[:100]}.{kind}."
+
+
+def recover(directory: Path) -> None:
+    """Tidy up beside a place after a process that was killed while it wrote there: the earlier directory goes back.
+
+    Only for who holds the place's lock (`workbench.campaign.lock`): what others write there would go.
+
+    Raises
+    ------
+    OutputError
+        The system refuses it.
+    """
+    try:
+        place = directory.resolve()
+        for old in _left(place, OLD):
+            if (old / EARLIER).is_dir() and not place.exists():
+                (old / EARLIER).rename(place)
+        for left in (*_left(place, OLD), *_left(place, STAGE)):
+            shutil.rmtree(left, ignore_errors=True)
+    except (OSError, RuntimeError, ValueError) as error:
+        raise _refused(directory, error) from error
+
+
+def _left(place: Path, kind: str) -> list[Path]:
+    if not place.parent.is_dir():
+        return []
+    begin = _beside(place, kind)
+    found = [path for path in place.parent.iterdir() if path.name.startswith(begin)]
+    return sorted(path for path in found if RANDOM.fullmatch(path.name[len(begin) :]) and path.is_dir())
 
 
 def _make_parents(place: Path) -> list[Path]:
@@ -139,8 +187,8 @@ def _replace(stage: Path, directory: Path) -> None:
     if not directory.exists():
         stage.rename(directory)
         return
-    old = Path(tempfile.mkdtemp(prefix=f".{directory.name[:100]}.old.", dir=directory.parent))
-    aside = old / "earlier"
+    old = Path(tempfile.mkdtemp(prefix=_beside(directory, OLD), dir=directory.parent))
+    aside = old / EARLIER
     try:
         directory.rename(aside)
         stage.rename(directory)

@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from workbench.campaign.spec import CaseSpec
 
 
+LARGEST_BOUND = 1e6
+"""Relative errors beyond this are no bounds."""
+
+
 class PrintedCost(Strict):
     """What a formula's authors printed of its computing cost: microseconds per sample, beside what is measured."""
 
@@ -27,7 +31,7 @@ class CandidateSpec(Strict):
 
     name: str
     reference: str
-    bound: Annotated[Finite, Field(gt=0)] | None = None
+    bound: Annotated[Finite, Field(gt=0, le=LARGEST_BOUND)] | None = None
     expect_fail: dict[str, Annotated[list[str], Field(min_length=1)]] = Field(default_factory=dict)
     """case -> joints whose error has to exceed the bound there; joints that are not named have to keep it"""
     printed_cost: PrintedCost | None = None

@@ -9,33 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.campaign.motion_spec import MAX_SAMPLES, RecordedMotion
+from workbench.campaign.planned import formula_of, planned_motion
 from workbench.campaign.recorded import read_torques, recorded_motion, records_of
-from workbench.campaign.recorded_spec import RecordedMotion, RecordedSpec
-from workbench.campaign.spec import (
-    MAX_SAMPLES,
-    Campaign,
-    CaseSpec,
-    CsvMotion,
-    CycleMotion,
-    MultiSineMotion,
-    SineMotion,
-)
+from workbench.campaign.recorded_spec import RecordedSpec
+from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.user_candidates import UserCandidate, offer
-from workbench.capabilities.robot import Robot, robot_with
+from workbench.capabilities.load import robot_with
+from workbench.capabilities.robot import Robot
 from workbench.data_files import bundled, bundled_names
 from workbench.documents import shorten
-from workbench.errors import MotionError, ParameterError, SpecError, WorkbenchError, did_you_mean
-from workbench.motion import (
-    JointMotion,
-    PickAndPlace,
-    PlatformMotion,
-    judged,
-    multi_sine,
-    pick_and_place,
-    read_joints,
-    sine,
-    time_grid,
-)
+from workbench.errors import MotionError, SpecError, WorkbenchError, did_you_mean
+from workbench.motion import JointMotion, PlatformMotion
 from workbench.recorded.read import Record
 from workbench.reference.replay import motion_through
 from workbench.robots.assignments import resolve_changes
@@ -312,27 +297,16 @@ def plan_motion(spec: CaseSpec, file: Path, robot: Robot) -> JointMotion | Platf
     ParameterError
         Another number of joints than the mechanism has.
     """
-    motion = spec.motion
-    if isinstance(motion, RecordedMotion):
-        return recorded_motion(motion, locate(file, motion.file, "motion.file"), robot)
-    if isinstance(motion, CsvMotion):
-        place = locate(file, motion.file, "motion.file")
-        return judged(read_joints(place, robot.joints, units=robot.coordinate_units))
-    if isinstance(motion, CycleMotion):
-        return pick_and_place(**motion.model_dump(exclude={"kind"}))
-    joints = len(motion.terms) if isinstance(motion, MultiSineMotion) else len(motion.amplitude)
-    if len(motion.offset) != len(robot.joints) or joints != len(robot.joints):
-        raise ParameterError(
-            f"motion: {len(motion.offset)} offset(s) and {joints} joint(s); {robot.name} has"
-            f" {len(robot.joints)} actuated joints: {', '.join(robot.joints)}"
-        )
-    return _harmonic(motion, time_grid(motion.start, motion.stop, samples=motion.samples, rate=motion.rate))
-
-
-def _harmonic(motion: SineMotion | MultiSineMotion, t: FloatArray) -> JointMotion:
-    if isinstance(motion, SineMotion):
-        return sine(t, motion.offset, motion.amplitude, motion.frequency, motion.phase)
-    return multi_sine(t, motion.offset, motion.terms)
+    if isinstance(spec.motion, RecordedMotion):
+        return recorded_motion(spec.motion, locate(file, spec.motion.file, "motion.file"), robot)
+    return planned_motion(
+        spec.motion,
+        lambda name: locate(file, name, "motion.file"),
+        robot.name,
+        robot.joints,
+        robot.coordinate_units,
+        robot.coordinates,
+    )
 
 
 Course = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
@@ -344,20 +318,14 @@ def course_of(case: Case) -> Course:
 
     The function raises MotionError for times or poses that the motion does not have.
     """
-    motion = case.spec.motion
-    if isinstance(motion, SineMotion | MultiSineMotion):
+    formula = formula_of(case.spec.motion, case.robot.coordinates)
+    if formula is not None:
 
-        def harmonic(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            found = _harmonic(motion, t)
+        def course(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            found = formula(t)
+            if isinstance(found, PlatformMotion):
+                return case.robot.joint_motion(found.x, found.xd, found.xdd)
             return found.q, found.qd, found.qdd
 
-        return harmonic
-    if isinstance(motion, CycleMotion):
-        plan = PickAndPlace(**motion.model_dump(exclude={"kind", "samples", "rate"}))
-
-        def cycle(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            found = plan.sample(np.clip(t, 0.0, plan.duration))
-            return case.robot.joint_motion(found.x, found.xd, found.xdd)
-
-        return cycle
+        return course
     return motion_through(case.motion.t, case.motion.q, case.motion.qd, case.motion.qdd)

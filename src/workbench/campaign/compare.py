@@ -17,12 +17,15 @@ from workbench.campaign.platform import Platform, platform_of
 from workbench.campaign.recorded import Found, judge
 from workbench.campaign.recorded_spec import RecordedSpec
 from workbench.campaign.spec import Campaign
+from workbench.campaign.spent import spent_on
 from workbench.campaign.torques import Fault, torques_of
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, RECORDED, kind_of, verdict_of
 from workbench.errors import ModelError, MotionError
+from workbench.hints import hint_of
 from workbench.recorded.read import Record
 from workbench.reference import MujocoReference, ReferenceResult
+from workbench.reference.crossings import look, refuse_crossings, worth
 from workbench.reference.raw_inverse import raw_mj_inverse
 from workbench.reference.skeleton import skeleton
 
@@ -80,8 +83,8 @@ class CaseResult:
     facts: dict[str, Any] = field(repr=False)
     faults: Sequence[Fault] = ()
     """what the user's candidates did wrong"""
-    model_text: str = field(default="", repr=False)
-    """MJCF of the reference, the case's parameters written into it"""
+    model: Any = field(default=None, repr=False)
+    """MuJoCo's model of the reference, the case's parameters in it; with drawings only"""
     qpos: FloatArray | None = field(default=None, repr=False)
     """``(n, nq)`` its poses, MuJoCo's own coordinates; with drawings only"""
 
@@ -109,6 +112,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         torques = computed.torques
     except MotionError as error:
         raise at_time(error, motion.t) from error
+    left = _left_out(case, reference, next(iter(results.values())))
     platform = platform_of(case, next(iter(results.values())))
     series |= platform.columns()
     if robot.closed_kinematics:  # else the case's platform motion is the reference's own
@@ -121,6 +125,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for row in _rows(case, candidate, computed.judged(candidate.name), results[candidate.reference], evidence)
     ]
     rows = [dataclasses.replace(row, verdict=FAIL) if row.candidate in computed.faults else row for row in rows]
+    hints = _hints(case, rows, torques, results)
     recorded = [_recorded(case, spec, record, reference, results, evidence) for spec, record in case.records]
     rows += [row for found in recorded for row in _recorded_rows(case, found, evidence)]
     if effort.budget:
@@ -140,14 +145,48 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     facts = _facts(case, reference, first, rows, platform) | {"evidence": evidence.facts()}
     if recorded:
         facts["recorded"] = {found.spec.label: found.facts for found in recorded}
+    facts["warnings"] = [*facts["warnings"], *hints, *left]
     if effort.drawing:
         drawing = skeleton(reference, first.qpos)
         for point, place in drawing.points.items():
             series |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
-    poses = first.qpos if effort.drawing else None
+        columns, spent = spent_on(case, reference, next(iter(results)))
+        series |= columns
+        if spent:
+            facts["spent"] = spent
+    poses, drawn = (first.qpos, reference.compiled()) if effort.drawing else (None, None)
     faults = tuple(computed.faults.values())
-    return CaseResult(case.name, rows, series, computed.noted(facts), faults, reference.text, poses)
+    return CaseResult(case.name, rows, series, computed.noted(facts), faults, drawn, poses)
+
+
+def _left_out(case: Case, reference: MujocoReference, result: ReferenceResult) -> tuple[str, ...]:
+    """What a reader has to know of the file and of what is left out of it.
+
+    Raises
+    ------
+    MotionError
+        The motion meets a limit or a contact that is left out, and the campaign does not say that it may.
+    """
+    ignore = case.robot.description.robot.setup.ignore
+    motion = case.motion
+    try:
+        notes = refuse_crossings(look(reference, result), ignore, motion.t)
+    except MotionError as error:
+        raise at_time(error, motion.t) from error
+    return (*reference.loaded.notes, *notes, *worth(reference, ignore, (motion.q, motion.qd, motion.qdd), result.tau))
+
+
+def _hints(
+    case: Case, rows: Sequence[Row], torques: Mapping[str, FloatArray], results: Mapping[str, ReferenceResult]
+) -> list[str]:
+    """What the errors of candidates that fail look like, where they have a familiar shape."""
+    failed = dict.fromkeys((row.candidate, row.reference) for row in rows if row.verdict in FAILURES)
+    said = []
+    for name, reference in failed:
+        words = hint_of(torques[name], results[reference].tau, case.motion.t, case.robot.joints)
+        said += [f'candidate "{name}" against "{reference}": {words}'] if words else []
+    return said
 
 
 def _refuse_other_branch(case: Case, x: FloatArray) -> None:

@@ -18,6 +18,7 @@ from workbench.campaign.cases import Case, course_of
 from workbench.campaign.unloaded import joint_error, largest_reaction
 from workbench.errors import CandidateError, MotionError, SpecError, did_you_mean
 from workbench.reference import MujocoReference, ReferenceResult
+from workbench.reference.left_open import left_open
 from workbench.reference.power import PowerBalance, power_balance
 from workbench.reference.replay import Replay, ReplaySet, replay
 
@@ -50,20 +51,24 @@ class Evidence:
     spread: dict[str, dict[str, float]] = field(default_factory=dict)
     """second engine against MuJoCo: mass model -> joint -> peak error"""
     replays: ReplaySet | None = None
+    undetermined: dict[str, dict[str, float]] = field(default_factory=dict)
+    """what the model leaves open, of each peak torque: loops that agree only to some digits, rods that are not round;
+    mass model -> joint; empty where nothing is open"""
     times: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def power_residual(self, mass_model: str) -> float:
         """Power balance of a reference, relative to peak power; NaN where it was not looked at."""
-        return self.power[mass_model].relative if mass_model in self.power else math.nan
+        return self.power[mass_model].uncertainty if mass_model in self.power else math.nan
 
     def engine_spread(self, mass_model: str, joint: str) -> float:
         """Peak error of the second engine against MuJoCo; NaN where there was none."""
         return self.spread.get(mass_model, {}).get(joint, math.nan)
 
     def uncertainty(self, mass_model: str, joint: str) -> float:
-        """The reference's own relative uncertainty on a joint: the larger of both; NaN where neither was looked at."""
-        known = [v for v in (self.power_residual(mass_model), self.engine_spread(mass_model, joint)) if v == v]
-        return max(known, default=math.nan)
+        """The reference's own relative uncertainty on a joint: the largest known; NaN where nothing was looked at."""
+        left_open = self.undetermined.get(mass_model, {}).get(joint, math.nan)
+        found = (self.power_residual(mass_model), self.engine_spread(mass_model, joint), left_open)
+        return max((value for value in found if not math.isnan(value)), default=math.nan)
 
     def facts(self) -> dict[str, Any]:
         """What the manifest holds of it; keys documented in docs/run-directory.md."""
@@ -74,10 +79,12 @@ class Evidence:
                     "peak_power_w": balance.peak_power,
                     "worst_time_s": float(self.times[balance.worst_sample]),
                     "differentiation": balance.differentiation,
+                    "rounding": balance.rounding,
                     "samples": len(balance.samples),
                 }
                 for name, balance in self.power.items()
             },
+            "undetermined": self.undetermined,
             "second_engine": {"engine": PINOCCHIO, "spread": self.spread} if self.spread else None,
             "replay": _replay_facts(self.replays) if self.replays else None,
         }
@@ -135,13 +142,26 @@ def gather_evidence(
     # of excess actuators the second engine solves for one set of torques among many, not for that of least norm
     second = PINOCCHIO in effort.engines and not reference.excess_actuators
     spread = _spread(case, results) if second else {}
+    left_open = {name: _left_open(case, reference, name, result) for name, result in results.items()}
+    left_open = {name: found for name, found in left_open.items() if found}
     if not effort.budget:
-        return Evidence(spread=spread, times=motion.t)
+        return Evidence(spread=spread, undetermined=left_open, times=motion.t)
     power = {
         name: power_balance(reference, motion.q, motion.qd, motion.qdd, name, force, tau=result.tau, along=motion.t)
         for name, result in results.items()
     }
-    return Evidence(power, spread, _replays(case, reference, candidates), motion.t)
+    return Evidence(power, spread, _replays(case, reference, candidates), left_open, motion.t)
+
+
+def _left_open(case: Case, reference: MujocoReference, mass_model: str, result: ReferenceResult) -> dict[str, float]:
+    """Of each joint's peak torque: what the model leaves open; empty where nothing is."""
+    motion = case.motion
+    worth = left_open(reference, result, motion.q, motion.qd, motion.qdd, mass_model, case.force)
+    if not worth.any():
+        return {}
+    peak = np.abs(result.tau).max(axis=0)
+    shares = np.divide(worth, peak, out=np.full_like(peak, np.inf), where=peak > 0.0)
+    return dict(zip(reference.joint_names, shares.tolist(), strict=True))
 
 
 def _spread(case: Case, results: Mapping[str, ReferenceResult]) -> dict[str, dict[str, float]]:
@@ -151,7 +171,7 @@ def _spread(case: Case, results: Mapping[str, ReferenceResult]) -> dict[str, dic
     engine = PinocchioReference(case.model, loaded=case.robot.loaded)
     spread: dict[str, dict[str, float]] = {}
     for name, result in results.items():
-        tau = engine.inverse_dynamics(motion.q, motion.qd, motion.qdd, name, case.force).tau
+        tau = engine.inverse_dynamics(motion.q, motion.qd, motion.qdd, name, case.force, ordered=True).tau
         reaction = largest_reaction(result.reactions.values())
         spread[name] = {
             joint: joint_error(tau[:, i], result.tau[:, i], reaction).peak_error

@@ -52,6 +52,21 @@ class ForeignCandidate(UserCandidate):
         self._formula = formula
         self._taken: list[float] = []
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file itself."""
+        return (self.file,)
+
+    @property
+    def takes_force(self) -> bool:
+        """Handed to all; whether the formula looks at it is its own affair."""
+        return True
+
+    @property
+    def function(self) -> Any:
+        """There is none in Python."""
+        return None
+
     def __call__(self, robot: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> FloatArray:
         """Call the formula.
 

@@ -1,7 +1,8 @@
 """One run at a time in a directory: a lock that the system takes back when the process that holds it dies.
 
-No clock and no process number decides: the lock is the system's own (flock), so what a killed run left behind is free,
-and a process that happens to have its number is not mistaken for it.
+No clock and no process number decides: the lock is the system's own, so what a killed run left behind is free, and a
+process that happens to have its number is not mistaken for it. How each system locks an open file is portalocker's
+business; its locks of whole files by name would empty the file, in which the holder's number stands.
 """
 
 from __future__ import annotations
@@ -11,8 +12,10 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from workbench.errors import OutputError
+from workbench.file_lock import open_lock, take
 
 PATIENCE_S = 0.3
 """How long a held lock is tried again: looking whether it is held (`holder`) takes it for a moment."""
@@ -24,19 +27,12 @@ def lock_path(directory: Path) -> Path:
     return place.parent / f".{place.name[:100]}.lock"
 
 
-def _take(descriptor: int) -> bool:
-    try:
-        if os.name == "nt":
-            import msvcrt
-
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
-        else:
-            import fcntl
-
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
+def _number(file: BinaryIO) -> str:
+    """Process number in a lock file; empty where the system keeps others from reading what is locked."""
+    with suppress(OSError):
+        file.seek(0)
+        return file.read(20).decode(errors="replace").strip()
+    return ""
 
 
 @contextmanager
@@ -52,36 +48,39 @@ def locked(directory: Path) -> Iterator[None]:
     made = [parent for parent in path.parents if not parent.exists()]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = _acquire(path, directory)
+        file = _acquire(path, directory)
     except (OSError, ValueError) as error:
         _remove_empty(made)
         reason = getattr(error, "strerror", None) or error
         raise OutputError(f"{directory}: cannot be written: {reason}", path=str(directory)) from error
     try:
         with suppress(OSError):  # a full disk: the lock holds all the same
-            os.ftruncate(descriptor, 0)
-            os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
+            file.truncate(0)
+            file.write(f"{os.getpid()}\n".encode())
         yield
     finally:
         with suppress(OSError):
             path.unlink()
-        os.close(descriptor)
+        file.close()
+        with suppress(OSError):  # where an open file cannot be removed
+            if os.name == "nt":
+                path.unlink()
         _remove_empty(made)
 
 
-def _acquire(path: Path, directory: Path) -> int:
+def _acquire(path: Path, directory: Path) -> BinaryIO:
     deadline = time.monotonic() + PATIENCE_S
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        if _take(descriptor):
+        file = open_lock(path, create=True)
+        if take(file):
             # the run that held it may have removed the file just now; a lock on a file without a name holds nobody off
             with suppress(OSError):
-                if os.fstat(descriptor).st_ino == path.stat().st_ino:
-                    return descriptor
-            os.close(descriptor)
+                if os.fstat(file.fileno()).st_ino == path.stat().st_ino:
+                    return file
+            file.close()
             continue
-        holder = os.pread(descriptor, 20, 0).decode(errors="replace").strip() or "?"
-        os.close(descriptor)
+        holder = _number(file) or "?"
+        file.close()
         if time.monotonic() > deadline:
             raise OutputError(
                 f"{directory}: another run (process {holder}) is writing it; wait for its end or name another place",
@@ -99,13 +98,11 @@ def _remove_empty(made: list[Path]) -> None:
 def holder(directory: Path) -> int | None:
     """Number of the process that writes a run directory; None where none does, 0 where its number is not readable."""
     try:
-        descriptor = os.open(lock_path(directory), os.O_RDWR | os.O_CLOEXEC)
-    except OSError:
+        file = open_lock(lock_path(directory), create=False)
+    except (OSError, ValueError):
         return None
-    try:
-        if _take(descriptor):
+    with file:
+        if take(file):
             return None
-        text = os.pread(descriptor, 20, 0).decode(errors="replace").strip()
-        return int(text) if text.isdigit() else 0
-    finally:
-        os.close(descriptor)
+        text = _number(file)
+        return int(text) if text.isdigit() and text.isascii() else 0

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.campaign import provenance
+from workbench.campaign.commit import git_commit
 from workbench.campaign.spec import Campaign
 from workbench.capabilities.robot import Robot
 
@@ -44,5 +45,5 @@ def describe(campaign: Campaign, file: Path, model: Path, robot: Robot) -> dict[
         ],
         "versions": provenance.versions(),
         "machine": provenance.machine(),
-        "git_commit": provenance.git_commit(file.resolve().parent),
+        "git_commit": git_commit(file.resolve().parent),
     }

@@ -1,11 +1,10 @@
-"""Where numbers come from: versions, machine, git commit, hash of the model."""
+"""Where numbers come from: versions, machine, hash of the model."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import platform
-import subprocess
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -46,24 +45,6 @@ def stamp(path: Path) -> tuple[int, int, int]:
     """
     status = path.stat()
     return status.st_mtime_ns, status.st_size, status.st_ino
-
-
-def git_commit(directory: Path) -> str | None:
-    """Commit of the checkout that holds *directory*, with ``+`` where it has uncommitted changes; None outside one."""
-
-    def git(*arguments: str) -> str | None:
-        try:
-            done = subprocess.run(
-                ["git", *arguments], cwd=directory, capture_output=True, text=True, timeout=10, check=True
-            )
-        except (OSError, subprocess.SubprocessError):
-            return None
-        return done.stdout.strip()
-
-    commit = git("rev-parse", "HEAD")
-    if commit is None:
-        return None
-    return f"{commit}+" if git("status", "--porcelain", "--untracked-files=no") else commit
 
 
 def sha256(data: bytes) -> str:

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.campaign.recorded_spec import RecordedMotion, RecordedSpec, wanted_of
+from workbench.campaign.motion_spec import RecordedMotion
+from workbench.campaign.recorded_spec import RecordedSpec, wanted_of
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
 from workbench.campaign.verdict import AGREES, DIFFERS, FAIL, PASS, UNDECIDED
 from workbench.capabilities.robot import Robot

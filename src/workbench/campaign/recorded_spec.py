@@ -1,4 +1,4 @@
-"""``[[recorded]]`` of a campaign, torques from elsewhere, and motions from tables that carry noise or few digits."""
+"""``[[recorded]]`` of a campaign: torques from elsewhere."""
 
 from __future__ import annotations
 
@@ -6,21 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from workbench.campaign.motion_spec import Columns
 from workbench.recorded.read import Wanted
 from workbench.schema import Finite, Strict
 
 Label = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]*\S[^\x00-\x1f]*$")]
-
-
-class ColumnSpec(Strict):
-    """A column of a table, by its header, and the unit where the header does not say it."""
-
-    name: str = ""
-    unit: str = ""
-
-
-Columns = dict[str, str | ColumnSpec]
-"""``t``, a joint or ``q1``, ``tau_JOINT`` or ``tau1`` -> header, or header and unit"""
 
 
 def wanted_of(columns: Columns) -> dict[str, Wanted]:
@@ -29,14 +19,6 @@ def wanted_of(columns: Columns) -> dict[str, Wanted]:
         key: Wanted(value) if isinstance(value, str) else Wanted(value.name, value.unit)
         for key, value in columns.items()
     }
-
-
-class RecordedMotion(Strict):
-    """Coordinates from a table, differentiated as their noise and digits allow; what that leaves open is stated."""
-
-    kind: Literal["recorded"]
-    file: str
-    columns: Columns = Field(default_factory=dict)
 
 
 class RecordedSpec(Strict):

@@ -12,9 +12,9 @@ from workbench.campaign import provenance
 from workbench.campaign.cases import locate, resolve_cases, robot_files
 from workbench.campaign.compare import Row
 from workbench.campaign.evidence import Effort
-from workbench.campaign.recorded_spec import RecordedMotion
+from workbench.campaign.motion_spec import TableMotion
 from workbench.campaign.run import compute_named_case
-from workbench.campaign.spec import CsvMotion, load_campaign
+from workbench.campaign.spec import load_campaign
 from workbench.campaign.user_candidates import load_candidates, with_rows
 from workbench.errors import WorkbenchError
 from workbench.mjcf.compile import find_model
@@ -82,7 +82,7 @@ def files_of(path: str | Path, model: Path | None = None, candidates: Sequence[s
         with contextlib.suppress(WorkbenchError):
             found += robot_files(campaign, file, model)
         for case in campaign.case:
-            if isinstance(case.motion, CsvMotion | RecordedMotion):
+            if isinstance(case.motion, TableMotion):
                 with contextlib.suppress(WorkbenchError):
                     found.append(locate(file, case.motion.file, "motion.file"))
     return tuple(dict.fromkeys(found))

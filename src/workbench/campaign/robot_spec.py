@@ -20,6 +20,10 @@ class RobotKeys(Strict):
     actuated: Annotated[list[str], Field(min_length=1)] | None = None
     """joints that are driven, in the order of q and tau"""
     platform_site: str | None = None
+    platform_body: str | None = None
+    """the body whose origin is the platform, in place of a site"""
+    fix_base: str | None = None
+    """body on a free joint that stands still: the base of a robot that walks"""
     base_body: str | None = None
     """fixed body in whose frame the platform is seen; the world where not said"""
     keyframe: str | None = None
@@ -34,12 +38,15 @@ class RobotKeys(Strict):
     def _whole(self) -> RobotKeys:
         if (self.robot is None) == (self.model is None):
             raise ValueError("give either robot, a robot file or its folder, or model, an MJCF")
-        if (self.actuated is None) != (self.platform_site is None):
+        if self.platform_site is not None and self.platform_body is not None:
+            raise ValueError("platform_site and platform_body: the platform is one of them")
+        if (self.actuated is None) != (self.platform_site is None and self.platform_body is None):
             raise ValueError(
-                "actuated and platform_site go together: the joints that are driven, the site that is moved"
+                "actuated and platform_site (or platform_body) go together: the joints that are driven, the site or"
+                " body that is moved"
             )
         if self.actuated is None:
-            for key in ("base_body", "keyframe", "initial", "lumped_bodies", "ignore", "read"):
+            for key in ("fix_base", "base_body", "keyframe", "initial", "lumped_bodies", "ignore", "read"):
                 if getattr(self, key):
                     raise ValueError(f"{key} goes with actuated and platform_site")
         elif self.robot is not None:
@@ -48,19 +55,20 @@ class RobotKeys(Strict):
 
     def own_robot(self, model: Path, campaign: Path) -> RobotFile | None:
         """The robot file that these keys amount to; None where they leave it to the model's own."""
-        if self.actuated is None or self.platform_site is None:
+        if self.actuated is None:
             return None
         spec = RobotSpec(
             name="".join(c if c.isalnum() or c in "_.+-" else "_" for c in model.stem).lstrip("_.+-")[:100] or "robot",
             title=model.stem.replace("_", " "),
             model=model.name,
             actuated=list(self.actuated),
-            platform=PlatformSpec(site=self.platform_site),
+            platform=PlatformSpec(site=self.platform_site or "", body=self.platform_body or ""),
             base=self.base_body or "world",
             keyframe=self.keyframe or "",
             initial=dict(self.initial),
             lumped=list(self.lumped_bodies),
             ignore=list(self.ignore),
+            fix_base=self.fix_base or "",
             parameters={name: ParameterSpec(at=[text], source=model.name) for name, text in self.read.items()},
         )
         return RobotFile(model, str(campaign), spec, section="read")

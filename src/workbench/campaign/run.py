@@ -21,7 +21,8 @@ from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.campaign.user_candidates import UserCandidate, load_candidates, with_rows
-from workbench.errors import SpecError, WorkbenchError
+from workbench.campaign.verdict import FAIL, VERIFICATION
+from workbench.errors import OutputError, SpecError, WorkbenchError
 from workbench.staging import check_output, staged
 
 
@@ -52,15 +53,18 @@ Progress = Callable[[str, int, int], None]
 """Called with a case's name, its number from 0, and the number of cases; at the end with an empty name."""
 
 
+Explain = Callable[[Sequence[Case], str, str], list[str]]
+"""From cases, a candidate and the mass model that it is held against to sentences about what is wrong with it."""
+
 Pick = Callable[[Campaign, Path, Path | None, Mapping[str, float], Sequence[str], Sequence[UserCandidate]], Campaign]
 """From a campaign with a sweep to one with some of its cases: campaign, file, model, settings, names, candidates."""
 
 
 def run_campaign(
     path: str | Path,
-    out: Path | None = None,
+    out: str | Path | None = None,
     *,
-    model: Path | None = None,
+    model: str | Path | None = None,
     only: Sequence[str] = (),
     settings: Mapping[str, float] | None = None,
     relative: Sequence[str] = (),
@@ -71,6 +75,7 @@ def run_campaign(
     effort: Effort = FULL,
     candidates: Sequence[str | Path] = (),
     pick: Pick | None = None,
+    explain: Explain | None = None,
 ) -> Outcome:
     """Run a campaign and write its run directory.
 
@@ -102,6 +107,8 @@ def run_campaign(
         Python files, or installed entry points, with formulas of the user's own.
     pick
         Makes a campaign of named cases from one with a sweep, `workbench.sweep.pick.pick_cases`.
+    explain
+        Says what is wrong with a formula that fails its verification, `workbench.diagnosis.brief.brief`.
 
     Raises
     ------
@@ -110,7 +117,12 @@ def run_campaign(
     """
     started, clock = datetime.now(UTC), time.perf_counter()
     campaign, file = load_campaign(path)
-    directory = out or Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
+    model = None if model is None else Path(model)
+    directory = (
+        Path(out)
+        if out is not None
+        else Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
+    )
     users = load_candidates(candidates)
     campaign = with_rows(campaign, users)
     if campaign.sweep:
@@ -121,7 +133,11 @@ def run_campaign(
     check_engines(effort.engines)
     cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users)
     results: list[CaseResult] = []
-    with locked(directory), staged(directory) as stage, closing(pictures) if pictures else nullcontext():
+    with (
+        locked(directory),
+        staged(directory, alone=True) as stage,
+        closing(pictures) if pictures else nullcontext(),
+    ):
         for number, case in enumerate(cases):
             if progress:
                 progress(case.name, number, len(cases))
@@ -143,13 +159,48 @@ def run_campaign(
             "engines": list(effort.engines),
             "budget": effort.budget,
         }
+        if explain:
+            manifest["diagnosis"] = _explained(cases, rows, path, candidates, explain)
         store.write_summary(stage, rows)
         store.write_manifest(stage, manifest)
         if pictures:
             pictures.finish(stage)
-        if report:
-            report(stage)
+        failure = _report(report, stage) if report else None
+    if failure is not None:
+        said = f"{failure}" if isinstance(failure, WorkbenchError) else f"{type(failure).__name__}: {failure}"
+        raise OutputError(
+            f"{directory}: the results stand there, its report could not be written:"
+            f" {said.replace(str(stage), str(directory))}; workbench report {directory} tries again",
+            path=str(directory),
+        ) from failure
     return Outcome(directory, passed, rows, manifest)
+
+
+def _explained(
+    cases: Sequence[Case], rows: Sequence[Row], path: str | Path, files: Sequence[str | Path], explain: Explain
+) -> dict[str, Any]:
+    """What is wrong with each formula that fails a verification, and the command that says more."""
+    failing: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        if row.kind == VERIFICATION and row.verdict == FAIL:
+            failing.setdefault((row.candidate, row.reference), []).append(row.case)
+    found = {}
+    for (candidate, reference), names in failing.items():
+        first = [case for case in cases if case.name in names]
+        sentences = explain([*first, *(case for case in cases if case.name not in names)], candidate, reference)
+        options = [word for file in files for word in ("--candidates", str(file))]
+        command = shlex.join(["workbench", "diagnose", str(path), *options, "--candidate", candidate])
+        found[candidate] = {"reference": reference, "findings": sentences, "command": command}
+    return found
+
+
+def _report(report: Callable[[Path], object], stage: Path) -> Exception | None:
+    """Write the report; what is wrong with it must not cost the results, which may have taken hours."""
+    try:
+        report(stage)
+    except Exception as error:
+        return error
+    return None
 
 
 def compute_named_case(campaign: Campaign, case: Case, file: Path, effort: Effort) -> CaseResult:

@@ -9,87 +9,27 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
-from workbench.campaign.recorded_spec import RecordedMotion, RecordedSpec
+from workbench.campaign.motion_spec import MOTIONS, Motion
+from workbench.campaign.recorded_spec import RecordedSpec
 from workbench.campaign.robot_spec import RobotKeys
 from workbench.campaign.sweep_spec import Filter, SweepSpec, Vary
-from workbench.data_files import bundled
+from workbench.data_files import bundled, bundled_names
 from workbench.documents import Form, read_toml, shorten
 from workbench.errors import SpecError, WorkbenchError, did_you_mean
-from workbench.schema import Finite, Name, Strict, Triple, Vector
+from workbench.schema import Finite, Name, Strict, Triple
 
 FORMAT = 1
-MAX_SAMPLES = 100_000
-"""Samples of one case: the reference holds some 20 kB of matrices for each while it computes."""
-
-Samples = Annotated[int, Field(le=MAX_SAMPLES)]
 
 
-class Window(Strict):
-    """When a motion is sampled: seconds, and either a number of samples or a rate in hertz."""
-
-    start: Finite = 0.0
-    stop: Finite
-    samples: Samples | None = None
-    rate: Finite | None = None
-
-    @model_validator(mode="after")
-    def _one_of(self) -> Window:
-        if (self.samples is None) == (self.rate is None):
-            raise ValueError("give exactly one of samples and rate")
-        if self.rate is not None and (self.stop - self.start) * self.rate >= MAX_SAMPLES:
-            raise ValueError(f"rate = {self.rate:g} Hz makes more samples than allowed: {MAX_SAMPLES}")
-        return self
-
-
-class SineMotion(Window):
-    """One sinusoid per joint."""
-
-    kind: Literal["sine"]
-    offset: Vector
-    amplitude: Vector
-    frequency: Vector
-    phase: Vector | None = None
-
-
-class MultiSineMotion(Window):
-    """Any number of sinusoids per joint, each ``[amplitude, frequency, phase]``."""
-
-    kind: Literal["multi_sine"]
-    offset: Vector
-    terms: list[list[Annotated[list[Finite], Field(min_length=2, max_length=3)]]]
-
-
-class CycleMotion(Strict):
-    """A pick-and-place cycle planned in platform space."""
-
-    kind: Literal["pick_and_place"]
-    pick: Triple
-    place: Triple
-    lift: Finite | Triple
-    up: Triple | None = None
-    lift_time: Finite
-    traverse_time: Finite
-    lower_time: Finite | None = None
-    dwell: Finite = 0.0
-    overlap: Finite = 0.0
-    back: bool = False
-    law: str = "quintic"
-    samples: Samples | None = None
-    rate: Finite | None = None
-
-
-class CsvMotion(Strict):
-    """A motion from a file beside the campaign: ``t, q1, q2, q3`` and, if given, derivatives."""
-
-    kind: Literal["csv"]
-    file: str
-
-
-Motion = Annotated[SineMotion | MultiSineMotion | CycleMotion | CsvMotion | RecordedMotion, Field(discriminator="kind")]
+def no_boolean(value: object) -> object:
+    """Refuse true where 1 is meant: Python takes the one for the other."""
+    if isinstance(value, bool):
+        raise ValueError("should be a number")
+    return value
 
 
 class ReplayWindow(Strict):
@@ -154,7 +94,7 @@ class ClaimSpec(Strict):
 class Campaign(RobotKeys):
     """A whole campaign file."""
 
-    format: Literal[1] = 1
+    format: Annotated[Literal[1], BeforeValidator(no_boolean)] = 1
     name: Name
     title: str
     description: str = ""
@@ -206,6 +146,11 @@ def load_campaign(path: str | Path) -> tuple[Campaign, Path]:
     return campaign, found
 
 
+def campaign_names() -> tuple[str, ...]:
+    """Names of the campaigns that come with the package."""
+    return tuple(name.removesuffix(".toml") for name in bundled_names("campaigns"))
+
+
 def _find(path: Path) -> Path:
     try:
         if path.is_file():
@@ -219,7 +164,8 @@ def _find(path: Path) -> Path:
             return bundled("campaigns", path.name)
         except WorkbenchError:
             pass
-    raise SpecError(f"{path}: no such campaign file", file=str(path))
+    named = f"; those that come along: {', '.join(campaign_names())}" if len(path.parts) <= 1 else ""
+    raise SpecError(f"{path}: no such campaign file{named}", file=str(path))
 
 
 FORM = Form(
@@ -228,10 +174,7 @@ FORM = Form(
         "candidate": CandidateSpec, "case": CaseSpec, "claim": ClaimSpec, "figure": FigureSpec, "measure": Measure,
         "recorded": RecordedSpec, "sweep": SweepSpec, "vary": Vary, "filter": Filter, "printed_cost": PrintedCost,
     },
-    kinds={
-        "sine": SineMotion, "multi_sine": MultiSineMotion, "pick_and_place": CycleMotion, "csv": CsvMotion,
-        "recorded": RecordedMotion,
-    },
+    kinds=MOTIONS,
     kinds_of="motion",
 )  # fmt: skip
 

@@ -36,7 +36,9 @@ def write_series(stage: Path, case: str, columns: Mapping[str, FloatArray]) -> N
     """Write one case's time series as Parquet; the same numbers give the same bytes."""
     folder = stage / SERIES
     folder.mkdir(exist_ok=True)
-    pd.DataFrame(dict(columns)).to_parquet(folder / f"{case}.parquet", index=False)
+    # by way of memory: Arrow opens no file whose name is not UTF-8
+    content = pd.DataFrame(dict(columns)).to_parquet(index=False)
+    (folder / f"{case}.parquet").write_bytes(content)
 
 
 def write_summary(stage: Path, rows: list[Row]) -> None:
@@ -58,6 +60,8 @@ def _plain(value: Any) -> Any:
         return [_plain(v) for v in value]
     if isinstance(value, np.generic):
         value = value.item()
+    if isinstance(value, str):  # names of files may hold what is no text
+        return value.encode("utf-8", "backslashreplace").decode()
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value

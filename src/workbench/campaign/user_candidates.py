@@ -6,27 +6,25 @@ Whatever it does becomes one line with the user's own file and line, and the cam
 
 from __future__ import annotations
 
-import importlib.util
 import inspect
 import re
-import signal
 import statistics
-import sys
-import threading
 import time
 import traceback
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from importlib.machinery import SourceFileLoader
-from importlib.metadata import entry_points
+from collections.abc import Iterable
+from contextlib import nullcontext
+from dataclasses import fields, is_dataclass
+from functools import partial
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import CodeType
 from typing import Any
 
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.campaign.candidate_spec import CandidateSpec
+from workbench.campaign.bounded_call import TooSlow, UnrulyError, bounded, said
+from workbench.campaign.candidate_spec import LARGEST_BOUND, CandidateSpec
+from workbench.campaign.formula_files import Siblings, load_module
 from workbench.campaign.spec import Campaign
 from workbench.capabilities.robot import Robot
 from workbench.errors import CandidateError, SpecError, did_you_mean
@@ -37,26 +35,31 @@ from workbench.schema import NAME, NAME_RULE
 LIMIT_S = 60.0
 """Longest time that one call may take before it is stopped, where the system can (not in threads, not on Windows)."""
 
+LOADING_LIMIT_S = 60.0
+"""Longest time that a file may take to run, likewise."""
+
 SLOW_S = 1e-3
 """Seconds per sample from which a candidate is called slow: the papers' slowest formula takes 7e-4 s."""
-
-GROUP = "workbench.candidates"
-"""Entry points of installed packages: each names a module with registered functions."""
-
-HERE = str(Path(__file__))
 
 
 class UserCandidate:
     """A user's function, called with arrays that it cannot write to and judged on what it returns."""
 
-    def __init__(self, function: Any, registration: Registration) -> None:
+    def __init__(self, function: Any, registration: Registration, module: str, siblings: Siblings | None) -> None:
         self.registration = registration
         self.name = registration.name
         self._function = function
-        code = inspect.unwrap(function).__code__
+        self._siblings = siblings
+        code = _code_of(function, module)
         self.file, self.line = Path(code.co_filename), code.co_firstlineno
         self._with_force = _takes_force(function, self.where)
         self._taken: list[float] = []
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file and those beside it that it has imported."""
+        others = self._siblings.files if self._siblings else ()
+        return (self.file, *sorted(path for path in others if path != self.file))
 
     @property
     def where(self) -> str:
@@ -64,9 +67,19 @@ class UserCandidate:
         return f"{self.file.name}:{self.line}"
 
     @property
+    def takes_force(self) -> bool:
+        """Whether the function is told the external force."""
+        return self._with_force
+
+    @property
     def seconds_per_sample(self) -> float:
         """Median over the calls so far; NaN before the first."""
         return statistics.median(self._taken) if self._taken else float("nan")
+
+    @property
+    def function(self) -> Any:
+        """What the user has written."""
+        return self._function
 
     def as_candidate(self) -> Candidate:
         """The same as a candidate of a robot."""
@@ -84,24 +97,38 @@ class UserCandidate:
         given = [_sealed(array) for array in ((q, qd, qdd, force) if self._with_force else (q, qd, qdd))]
         begun = time.perf_counter()
         try:
-            with _limit(LIMIT_S):
-                found = self._function(robot.parameters, *given)
-        except _TooSlow as error:
-            raise self._fault(f"takes more than {LIMIT_S:g} s for {len(q)} samples", error) from error
-        except (Exception, SystemExit) as error:  # an exit code of theirs would be taken for the verdict
-            raise self._fault(f"{type(error).__name__}: {error}", error) from error
+            found = bounded(lambda: self._call(robot.parameters, given, q.shape), LIMIT_S)
+        except UnrulyError as trouble:
+            what = f"{trouble} for {len(q)} samples" if isinstance(trouble.error, TooSlow) else str(trouble)
+            raise self._fault(what + _valid_names(trouble.error, robot.parameters), trouble.error) from trouble.error
         self._taken.append((time.perf_counter() - begun) / max(len(q), 1))
         return self._checked(found, q.shape, robot.joints)
 
+    def _call(self, parameters: Any, given: list[FloatArray], shape: tuple[int, ...]) -> Any:
+        """Call the function and turn what it returns into an array, which may run code of the user's as well."""
+        with self._siblings.visible() if self._siblings else nullcontext():
+            found = self._function(parameters, *given)
+            if isinstance(found, np.ndarray):
+                return found.view(np.ndarray) if type(found) is np.ndarray else np.asarray(found)
+            if type(found) in (list, tuple):
+                if len(found) != shape[0]:
+                    raise TypeError(f"returns {len(found)} rows; expected {shape[0]}, one for each sample")
+                return np.asarray(found)
+            if hasattr(found, "__array__"):
+                return np.asarray(found)
+        return found
+
     def _checked(self, found: Any, shape: tuple[int, ...], joints: tuple[str, ...]) -> FloatArray:
-        if np.iscomplexobj(found):
+        if not isinstance(found, np.ndarray) or found.dtype.kind not in "fiubc":
+            kind = f"an array of {found.dtype}" if isinstance(found, np.ndarray) else said(type(found).__name__)
+            raise self._fault(f"returns {kind}; expected numbers of shape {shape}")
+        if found.dtype.kind == "c":
             raise self._fault("returns complex numbers; expected real ones")
-        try:
-            tau = np.array(found, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise self._fault(f"returns {type(found).__name__}; expected numbers of shape {shape}") from error
-        if tau.shape != shape:
-            raise self._fault(f"returns an array of shape {tau.shape}; expected {shape}: samples, then {_and(joints)}")
+        if found.shape != shape:
+            raise self._fault(
+                f"returns an array of shape {found.shape}; expected {shape}: samples, then {_and(joints)}"
+            )
+        tau = np.array(found, dtype=np.float64)
         if not np.isfinite(tau).all():
             sample, joint = np.argwhere(~np.isfinite(tau))[0]
             raise self._fault(
@@ -119,27 +146,14 @@ class UserCandidate:
         return CandidateError(f'candidate "{self.name}" ({line}) {what}', candidate=self.name, line=line, **facts)
 
 
-class _TooSlow(BaseException):
-    """Stops a user's function; no ``except Exception`` of theirs holds it up."""
-
-
-@contextmanager
-def _limit(seconds: float) -> Iterator[None]:
-    able = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread()
-    if not able:
-        yield
-        return
-
-    def stop(number: int, frame: object) -> None:
-        raise _TooSlow
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+def _valid_names(error: BaseException, parameters: Any) -> str:
+    """Return the names that the parameters have, where a formula has asked for another one."""
+    if not isinstance(error, AttributeError) or error.obj is not parameters or not is_dataclass(parameters):
+        return ""
+    if "did you mean" in said(error) or "valid:" in said(error):
+        return ""  # they have said it themselves
+    names = {part for one in fields(parameters) for part in (one.name, re.sub("_(left|right)$", "", one.name))}
+    return did_you_mean(error.name or "", names)
 
 
 def _sealed(array: FloatArray) -> FloatArray:
@@ -152,16 +166,36 @@ def _and(names: tuple[str, ...]) -> str:
     return " ".join(names)
 
 
+def _code_of(function: Any, module: str) -> CodeType:
+    """Return the code of a plain function, or of the one that a decorator has wrapped."""
+    try:
+        code = getattr(inspect.unwrap(function), "__code__", None)
+    except Exception:
+        code = None
+    if not isinstance(code, CodeType) or isinstance(function, type | partial):
+        raise SpecError(
+            f"{module}: a candidate is a function that is defined with def, got {said(type(function).__name__)};"
+            " write one that calls it"
+        )
+    return code
+
+
 def _takes_force(function: Any, where: str) -> bool:
     """Whether a function takes the external force as its fifth argument."""
-    parameters = list(inspect.signature(function).parameters.values())
+    try:
+        signature = inspect.signature(function)
+    except Exception as error:
+        raise SpecError(f"{where}: what it is called with cannot be told: {said(error)}") from error
+    if inspect.iscoroutinefunction(function) or inspect.isgeneratorfunction(inspect.unwrap(function)):
+        raise SpecError(f"{where}: a candidate returns its torques; this one is called in pieces (async or yield)")
+    parameters = list(signature.parameters.values())
     kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     needed = [p for p in parameters if p.kind in kinds and p.default is p.empty]
     taken = [p for p in parameters if p.kind in kinds]
     if len(needed) > 5 or len(taken) < 4 or any(p.kind is p.KEYWORD_ONLY and p.default is p.empty for p in parameters):
         raise SpecError(
             f"{where}: a candidate is called as f(parameters, q, qd, qdd) or f(parameters, q, qd, qdd, external_force),"
-            f" got {getattr(function, '__name__', 'f')}{inspect.signature(function)}"
+            f" got {said(getattr(function, '__name__', 'f'))}{said(signature)}"
         )
     return len(taken) >= 5
 
@@ -188,77 +222,53 @@ def load_candidates(names: Iterable[str | Path]) -> tuple[UserCandidate, ...]:
         if is_foreign(Path(name)):
             found.append(load_foreign(Path(name)))
             continue
-        module = _module(str(name))
+        module, siblings = load_module(str(name), LOADING_LIMIT_S)
         registered = [
-            UserCandidate(value, getattr(value, MARK))
-            for value in list(vars(module).values())
-            if callable(value) and isinstance(getattr(value, MARK, None), Registration)
+            UserCandidate(value, mark, str(name), siblings)
+            for value, mark in ((value, _mark(value)) for value in list(vars(module).values()))
+            if mark is not None
         ]
         if not registered:
             raise SpecError(
                 f"{name}: no candidate is registered in it; mark a function with @workbench.candidate",
                 file=str(name),
             )
-        found += dict.fromkeys(registered)
+        found += {id(one.function): one for one in registered}.values()
     for one in found:
-        if not re.match(NAME, one.name):
-            raise SpecError(f'{one.where}: candidate name "{one.name}"; {NAME_RULE}', candidate=one.name)
+        _check_registration(one)
         if sum(one.name == other.name for other in found) > 1:
             raise SpecError(f'{one.where}: candidate "{one.name}" is registered twice', candidate=one.name)
     return tuple(found)
 
 
+def _mark(value: Any) -> Registration | None:
+    try:
+        mark = getattr(value, MARK, None) if callable(value) else None
+    except Exception:  # an object whose attributes raise is no candidate
+        return None
+    return mark if isinstance(mark, Registration) else None
+
+
+def _check_registration(one: UserCandidate) -> None:
+    about = one.registration
+    if not isinstance(about.name, str) or not re.match(NAME, about.name):
+        raise SpecError(f'{one.where}: candidate name "{said(about.name)}"; {NAME_RULE}')
+    for what in ("reference", "description", "source"):
+        if not isinstance(getattr(about, what), str):
+            kind = said(type(getattr(about, what)).__name__)
+            raise SpecError(f'{one.where}: candidate "{one.name}": {what} is {kind}; allowed: a text')
+    bound = about.bound
+    if bound is not None and (
+        isinstance(bound, bool) or not isinstance(bound, int | float) or not 0 < bound <= LARGEST_BOUND
+    ):
+        raise SpecError(
+            f"{one.where}: bound = {said(bound)}; allowed: a number > 0, at most {LARGEST_BOUND:g}", candidate=one.name
+        )
+
+
 def full_names(names: Iterable[str | Path]) -> tuple[str, ...]:
     """Names that mean the same in another process: whole paths of files, entry points as they are."""
     return tuple(str(Path(name).resolve()) if Path(name).is_file() else str(name) for name in names)
-
-
-def _module(name: str) -> ModuleType:
-    path = Path(name)
-    installed = {entry.name: entry for entry in entry_points(group=GROUP)}
-    if not path.is_file():
-        if name in installed:
-            return _run(name, installed[name].load)
-        raise SpecError(
-            f"{name}: no such Python file, nor an installed entry point of {GROUP}{did_you_mean(name, installed)}",
-            file=name,
-        )
-    if path.suffix != ".py":
-        raise SpecError(
-            f"{name}: candidates stand in a file .py, .m, .c, .so, .jl, .R or in a program that can be run", file=name
-        )
-    loader = _Uncached(f"workbench_candidates_{path.stem}", str(path.resolve()))
-    spec = importlib.util.spec_from_loader(loader.name, loader)
-    assert spec is not None
-    module = importlib.util.module_from_spec(spec)
-    # dataclasses and pickle look a function's module up by its name
-    sys.modules[spec.name] = module
-
-    def execute() -> ModuleType:
-        loader.exec_module(module)
-        return module
-
-    return _run(name, execute)
-
-
-class _Uncached(SourceFileLoader):
-    """Reads the source every time: a sign mended within a second leaves a file's size and second of saving alone."""
-
-    def get_code(self, fullname: str) -> CodeType:
-        """Compile what the file holds now."""
-        return self.source_to_code(self.get_data(self.path), self.path)
-
-
-def _run(name: str, load: Any) -> ModuleType:
-    try:
-        module: ModuleType = load()
-    except SyntaxError as error:
-        raise SpecError(f"{name}:{error.lineno}: {error.msg}", file=name) from error
-    except (Exception, SystemExit) as error:  # an exit code of theirs would be taken for the verdict
-        own = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).name == Path(name).name]
-        line = f":{own[-1].lineno}" if own else ""
-        raise SpecError(f"{name}{line}: {type(error).__name__}: {error}", file=name) from error
-    return module
 
 
 def offer(robot: Robot, users: Iterable[UserCandidate]) -> None:
@@ -279,20 +289,12 @@ def offer(robot: Robot, users: Iterable[UserCandidate]) -> None:
 
 
 def with_rows(campaign: Campaign, users: Iterable[UserCandidate]) -> Campaign:
-    """Return the campaign with a row for each of the user's candidates that it does not name itself.
-
-    Raises
-    ------
-    SpecError
-        A registered bound that is not a positive number.
-    """
+    """Return the campaign with a row for each of the user's candidates that it does not name itself."""
     named = {candidate.name for candidate in campaign.candidate}
     rows = []
     for user in users:
         if user.name in named:
             continue
         about = user.registration
-        if about.bound is not None and not (isinstance(about.bound, int | float) and 0 < about.bound < float("inf")):
-            raise SpecError(f"{user.where}: bound = {about.bound!r}; allowed: a number > 0")
         rows.append(CandidateSpec(name=user.name, reference=about.reference, bound=about.bound))
     return campaign.model_copy(update={"candidate": [*campaign.candidate, *rows]}) if rows else campaign

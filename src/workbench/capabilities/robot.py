@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections import ChainMap
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch
-from workbench.capabilities.defaults import robot_of_model
 from workbench.capabilities.identity import RobotIdentity
 from workbench.capabilities.limits import reach_box
 from workbench.capabilities.samples import one_or_many
@@ -25,13 +22,11 @@ from workbench.capabilities.warnings import (
 )
 from workbench.errors import ParameterError
 from workbench.reference import MujocoReference
+from workbench.reference.task import continuous, task_motion, task_of
 from workbench.robots.closed_form import Candidate, ClosedForm, Condition, Reach
 from workbench.robots.description import Description
 from workbench.robots.kernel_call import TorqueKernel
-from workbench.robots.load import Base, LoadedModel, read_base, with_overrides
-from workbench.robots.robot_file import RobotFile
-
-__all__ = ["Robot", "load_robot", "robot_with"]
+from workbench.robots.load import Base, LoadedModel, with_overrides
 
 
 class Robot(RobotIdentity):
@@ -183,12 +178,19 @@ class Robot(RobotIdentity):
             return moved
         return self.reference.platform_motion(self._checked(q), qd, qdd, self.coordinates)
 
-    def platform_along(self, t: FloatArray, *motion: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """As `platform_motion`, of samples that are one motion at times ``(n,)``: loops are closed along it."""
+    def platform_along(
+        self, t: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """As `platform_motion`, for samples that are one motion, in the order of times ``(n,)``.
+
+        Closed forms know their branch from q alone; the reference, which closes loops step by step, follows the motion.
+        """
         if self._own("platform_motion"):
-            return self.platform_motion(*motion)
-        q, qd, qdd = motion
-        return self.reference.platform_motion(self._checked(q), qd, qdd, self.coordinates, t)
+            return self.platform_motion(q, qd, qdd)
+        found = self.reference.inverse_dynamics(self._checked(q), qd, qdd, along=t)
+        task, position = task_of(self.coordinates), (found.x, found.xd, found.xdd)
+        x, xd, xdd = task_motion(task, position, found.rotation, found.omega, found.alpha)
+        return continuous(task, x), xd, xdd
 
     @one_or_many(1)
     def jacobian(self, q: ArrayLike) -> FloatArray:
@@ -365,36 +367,3 @@ class _Offered(ChainMap[str, Candidate]):
     @property
     def on_purpose(self) -> Any:
         return getattr(self.maps[1], "on_purpose", ())
-
-
-def robot_with(path: str | Path, parameters: Mapping[str, float], robot: RobotFile | None = None) -> Robot:
-    """Load a robot with parameters changed; *robot* describes it, where another description than its own counts.
-
-    Raises
-    ------
-    ModelError, ParameterError, SpecError
-        See `load_robot`.
-    """
-    base = read_base(path, robot=robot)
-    if base.loaded.description is None:
-        base = dataclasses.replace(base, loaded=robot_of_model(base.loaded))
-    loaded = with_overrides(base, parameters)
-    return Robot(base, loaded.values, loaded)
-
-
-def load_robot(path: str | Path, **parameters: float) -> Robot:
-    """Load a robot; nothing of its folder is run.
-
-    Parameters
-    ----------
-    path
-        A folder with a robot file, the robot file, an MJCF, ``models/NAME.xml``, or a name of a robot that comes along.
-    **parameters
-        Changes by name, SI: ``payload=0.5``, ``a2_left=0.31``.
-
-    Raises
-    ------
-    ModelError, ParameterError, SpecError
-        See `workbench.robots.load.load_model`.
-    """
-    return robot_with(path, parameters)

@@ -9,7 +9,6 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError
-from workbench.reference.structure import SPIN
 from workbench.robots.friction import DriveFriction
 from workbench.robots.parameters import ParameterTable
 
@@ -63,13 +62,15 @@ def reference_warnings(robot: Robot, qd: FloatArray | None) -> list[str]:
             " are those of least norm, newtons and newton-metres counted alike; no second engine looks at"
             " them, and reactions are left out"
         )
-    spinning = structure.blocks[structure.blocks[:, 0] == SPIN, 1]
-    for name, body in zip(structure.idle, spinning, strict=True):
-        dofs = slice(model.body_dofadr[body], model.body_dofadr[body] + 3)
-        if model.dof_damping[dofs].any() or model.dof_armature[dofs].any():
+    found += reference.notes
+    for name, rod in zip(structure.idle, structure.rods, strict=True):
+        joints = [-1 - end for end in (rod.near, rod.far) if end < 0]
+        dofs = [d for j in joints for d in range(model.jnt_dofadr[j], model.jnt_dofadr[j] + 3)]
+        felt = (model.dof_damping, model.dof_armature, model.dof_frictionloss)
+        if any(values[dofs].any() for values in felt) or model.jnt_stiffness[joints].any():
             found.append(
-                f"rod {name}: damping or armature of its ball joint would spin it about its own axis; the reference"
-                " holds that spin at zero, by a moment that no actuator gives"
+                f"rod {name}: damping, dry friction, stiffness or armature of its ball joint would spin it about"
+                " its own axis; the reference holds that spin at zero, by a moment that no actuator gives"
             )
     return found
 

@@ -36,6 +36,8 @@ def settings(assignments: Iterable[str], option: str = "--set") -> tuple[dict[st
             relative.append(assignment)
         else:
             try:
+                if "_" in value:
+                    raise ValueError  # Python reads 1_000 as a number; here it is a slip
                 found[name] = float(value)
             except ValueError:
                 raise ParameterError(f'{option} "{assignment}": expected {SETTING}') from None

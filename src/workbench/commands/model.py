@@ -71,22 +71,31 @@ def check(
             "--campaign", metavar="FILE", help="Campaign that names the actuated joints and platform of this MJCF."
         ),
     ] = None,
+    actuated: Annotated[
+        list[str] | None,
+        typer.Option("--actuated", metavar="A,B", help="Joints to drive, of a file that names no closed form."),
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Print every line, not only what fails.")] = False,
     json: Json = False,
 ) -> None:
-    """Compile, close the loops, and check every assumption of the closed form.
+    """Compile, close the loops, and check every assumption of the closed form; of any other file, propose a campaign.
 
-    Exit code 0: all is well; 1: an assumption is broken or the loops do not close; 2: the file cannot be read.
+    Exit code 0: all is well; 1: something is broken or not covered; 2: the file cannot be read.
     """
     from workbench.campaign.cases import robot_of
     from workbench.campaign.spec import load_campaign
     from workbench.commands.model_tables import print_check, print_json
-    from workbench.reference.check import check_model
+    from workbench.reference.check import check_model, names_itself
 
+    if campaign is None and (actuated or not names_itself(path)):
+        from workbench.commands.import_model import names_of, print_proposal
+
+        raise typer.Exit(print_proposal(path, names_of(tuple(actuated or ())), everything, json))
     found = check_model(path, robot=robot_of(*load_campaign(campaign), path)[0] if campaign else None)
     if json:
         print_json(found)
     else:
-        print_check(found)
+        print_check(found, everything)
     if found.exit_code:
         raise typer.Exit(found.exit_code)
 

@@ -53,8 +53,11 @@ def print_edit(result: EditResult) -> None:
     out.print(Text(f"{result.written}: {len(result.lines)} {word} changed ({lines}{more})"), soft_wrap=True)
 
 
-def print_check(found: ModelCheck) -> None:
-    """Print everything that was found out about a model; what is broken comes last, one line each."""
+def print_check(found: ModelCheck, everything: bool = False) -> None:
+    """Print what was found out about a model; what is broken comes last, one line each.
+
+    Assumptions that hold are counted, and listed with *everything* only.
+    """
     out.print(Text(f"{found.file}: {found.mechanism or 'no closed form named'}", style="bold"), soft_wrap=True)
     facts = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
     facts.add_column(no_wrap=True)
@@ -62,9 +65,10 @@ def print_check(found: ModelCheck) -> None:
     for name, value in _facts(found):
         facts.add_row(Text(name), Text(value))
     out.print(facts)
-    if found.assumptions:
+    shown = [a for a in found.assumptions if everything or not a.ok]
+    if shown:
         table = _table("", "assumption", "where", "value", "needed")
-        for a in found.assumptions:
+        for a in shown:
             mark = Text("ok", style="green") if a.ok else Text("BROKEN", style="bold red")
             table.add_row(mark, Text(a.name), Text(a.where), Text(a.value), Text(a.limit))
         out.print(table)

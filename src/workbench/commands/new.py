@@ -120,6 +120,19 @@ def _number(loops: str) -> int:
     return int(loops)
 
 
+def _from_file(source: Path, directory: Path, loops: str | None, actuated: tuple[str, ...]) -> None:
+    """Write the folder of a robot that a file holds."""
+    from workbench.commands.from_urdf import from_urdf
+    from workbench.commands.import_model import import_model
+
+    if source.suffix.lower() == ".urdf":
+        from_urdf(source, directory, Path(loops) if loops else None, actuated)
+        return
+    if loops is not None:
+        raise SpecError(f"--loops {loops}: {source} is no URDF (.urdf); an MJCF holds its loops itself")
+    import_model(source, directory, actuated)
+
+
 def new(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory to make; its name names the files.")],
     actuated: Annotated[
@@ -137,17 +150,17 @@ def new(
         typer.Option(metavar="octave|c|julia|program", help="The formula in this language too. Default: Python alone."),
     ] = None,
     source: Annotated[
-        Path | None, typer.Option("--from", metavar="FILE", help="A robot's URDF, in place of a sketch.")
+        Path | None,
+        typer.Option("--from", metavar="FILE", help="A robot's MJCF as it lies, or its URDF, in place of a sketch."),
     ] = None,
 ) -> None:
     """Write a model with closed loops, its campaign, a formula to fill in and a test; they run at once.
 
-    With --from, the robot is a URDF's, and --loops names the table of its loops (.toml, .yaml).
+    With --from, the robot is a file's: its loops, joints to drive, platform, first guess and a small motion are found.
+    A URDF holds a tree: --loops names the table of its loops (.toml, .yaml).
     """
     if source is not None:
-        from workbench.commands.from_urdf import from_urdf
-
-        from_urdf(source, directory, Path(loops) if loops else None, tuple(actuated or ()))
+        _from_file(source, directory, loops, tuple(actuated or ()))
         return
     if language is not None and language not in LANGUAGES:
         raise SpecError(f"--language {language}; allowed: {', '.join(LANGUAGES)}")

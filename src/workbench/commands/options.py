@@ -10,6 +10,10 @@ import typer
 CampaignArgument = Annotated[
     Path, typer.Argument(metavar="CAMPAIGN", help="Campaign file (TOML), or the name of one that comes along.")
 ]
+CampaignOrNone = Annotated[
+    Path | None,
+    typer.Argument(metavar="CAMPAIGN", help="Campaign file (TOML), or the name of one that comes along; none: a list."),
+]
 RobotArgument = Annotated[
     Path,
     typer.Argument(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,16 +12,20 @@ if TYPE_CHECKING:
     from workbench.rendering.poses import Poses
 
 
+LEAST, MOST = 1e-4, 1e4
+"""Of speeds and of pictures a second."""
+
+
 def positive(name: str, value: float) -> None:
-    """Refuse what is not a positive number.
+    """Refuse what is not a positive number that a film can have.
 
     Raises
     ------
     ParameterError
         Naming the option.
     """
-    if not 0.0 < value < math.inf:
-        raise ParameterError(f"--{name} {value:g}; allowed: a positive number", value=value)
+    if not LEAST < value < MOST:
+        raise ParameterError(f"--{name} {value:g}; allowed: a positive number, {LEAST:g} to {MOST:g}", value=value)
 
 
 def size_of(text: str) -> tuple[int, int]:

@@ -23,8 +23,12 @@ def report(
     html: report.html. md: report.md with figures/*.svg. pdf: report.pdf, figures/*.pdf and tables/*.tex. csv, mat:
     data/, for other programs, with units.
     """
+    from workbench.console import Steps
     from workbench.report import build_report
 
-    for path in build_report(run_dir, tuple(dict.fromkeys(format_ or ("html", "md"))), style):
+    formats = tuple(dict.fromkeys(format_ or ("html", "md")))
+    with Steps("drawing figures") as show:
+        written = build_report(run_dir, formats, style, show)
+    for path in written:
         if path.parent in (run_dir, run_dir / "data"):
             typer.echo(str(path))

@@ -9,14 +9,14 @@ from typing import Annotated
 import typer
 
 from workbench.commands.assignments import settings
-from workbench.commands.options import CampaignArgument, OtherModel, SetInCases
+from workbench.commands.options import CampaignOrNone, OtherModel, SetInCases
 from workbench.errors import SpecError
 
 BOUND_FAILED = 1
 
 
 def run(
-    campaign: CampaignArgument,
+    campaign: CampaignOrNone = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -68,23 +68,24 @@ def run(
     """
     from workbench.campaign.evidence import Effort
     from workbench.campaign.run import run_campaign
-    from workbench.campaign.spec import load_campaign
+    from workbench.campaign.spec import campaign_names, load_campaign
     from workbench.commands.sweeps import dry_run as print_dry_run
     from workbench.commands.sweeps import report_apart, run_and_print
     from workbench.console import CaseProgress, print_outcome
     from workbench.sweep.pick import pick_cases
     from workbench.sweep.run import SweepInterrupted, SweepOptions
 
+    if campaign is None:
+        raise SpecError(f"which CAMPAIGN? A TOML file, or one that comes along: {', '.join(campaign_names())}")
     values, relative = settings(set_ or [])
     effort = Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick)
     command = ["workbench", *sys.argv[1:]]
     spec, file = load_campaign(campaign)
     sweep = spec.sweep is not None and not only
-    for option, given in (("--only", only and dry_run), ("--set NAME*=FACTOR", relative)):
-        if given and (sweep or dry_run):
-            raise SpecError(f"{campaign}: {option} does not go with {'--dry-run' if dry_run else 'a sweep'}")
+    if relative and (sweep or dry_run):
+        raise SpecError(f"{campaign}: --set NAME*=FACTOR does not go with {'--dry-run' if dry_run else 'a sweep'}")
     if dry_run:
-        print_dry_run(spec, file, model, values, effort, jobs, candidates or ())
+        print_dry_run(spec, file, model, values, effort, jobs, candidates or (), only or ())
         return
     if sweep:
         try:
@@ -104,6 +105,7 @@ def run(
             typer.echo(f"workbench: {stop}", err=True)
             raise
     else:
+        from workbench.diagnosis.brief import brief
         from workbench.rendering.run_pictures import RunPictures
         from workbench.report import build_report
 
@@ -122,6 +124,7 @@ def run(
                 effort=effort,
                 candidates=candidates or (),
                 pick=pick_cases,
+                explain=brief,
             )
         print_outcome(outcome)
         passed = outcome.passed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from workbench import processes
 from workbench.campaign.evidence import Effort, check_engines
 from workbench.campaign.spec import Campaign
 from workbench.console import err, out
@@ -96,16 +96,17 @@ def dry_run(
     effort: Effort,
     jobs: int | None,
     candidates: Sequence[str | Path] = (),
+    only: Sequence[str] = (),
 ) -> None:
     """Print what a run would take; nothing is written."""
     check_engines(effort.engines)
-    found = estimate(campaign, file, model, settings, effort, jobs, candidates)
+    found = estimate(campaign, file, model, settings, effort, jobs, candidates, only)
     out.print(Text(f"{campaign.name}: {found.cases} cases, {found.samples} samples"))
     workers = "worker" if found.jobs == 1 else "workers"
     out.print(Text(f"  time: about {duration(found.seconds)} with {found.jobs} {workers}"))
-    running = f", {size(found.bytes_while_running)} while it runs" if campaign.sweep else ""
+    running = f", {size(found.bytes_while_running)} while it runs" if campaign.sweep and not only else ""
     out.print(Text(f"  disk: about {size(found.bytes_at_end)}{running}"))
-    if campaign.sweep:
+    if campaign.sweep and not only:
         parts = [f"{found.tried_filtered} left out by the filter", f"{found.tried_failed} not passed"]
         out.print(Text(f"  of {found.tried} cases tried: {', '.join(parts)}"))
 
@@ -151,9 +152,11 @@ def report_apart(directory: Path) -> None:
     OutputError
         The report cannot be written; the results stand.
     """
-    # no current directory and no user's modules before the package's own, as in the command itself
-    command = [sys.executable, "-P", "-m", "workbench.cli", "report", "--", str(directory)]
-    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    command = processes.python_module("workbench.cli", "report", "--", str(directory))
+    done = subprocess.run(
+        command, env=processes.environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True,
+        errors="replace", check=False,
+    )  # fmt: skip
     if done.returncode:
         said = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
         raise OutputError(said.removeprefix("workbench: "), path=str(directory))

@@ -37,9 +37,10 @@ def workspace(
 ) -> None:
     """Compute the reachable workspace by discretisation: volume with its error, cells as Parquet, figures."""
     from workbench.campaign.cases import resolve_cases
+    from workbench.campaign.lock import locked
     from workbench.campaign.spec import load_campaign
-    from workbench.capabilities.robot import robot_with
-    from workbench.console import print_workspace
+    from workbench.capabilities.load import robot_with
+    from workbench.console import Steps, print_workspace
     from workbench.report.workspace import draw_workspace
     from workbench.robots.assignments import resolve_changes
     from workbench.robots.catalogue import find_source
@@ -58,8 +59,11 @@ def workspace(
     if campaign:
         spec, file = load_campaign(campaign)
         paths = {case.name: case.x for case in resolve_cases(spec, file, find_source(model).model)}
-    computed = compute_workspace(robot, grid, ranges(limit or []), settings(at or [], "--at")[0])
-    with staged(directory) as stage:
-        write_workspace(stage, computed, robot)
-        draw_workspace(stage, paths)
+    with Steps("computing and drawing the workspace") as show:
+        show(0, 2)
+        computed = compute_workspace(robot, grid, ranges(limit or []), settings(at or [], "--at")[0])
+        show(1, 2)
+        with locked(directory), staged(directory, alone=True) as stage:
+            write_workspace(stage, computed, robot)
+            draw_workspace(stage, paths)
     print_workspace(workspace_facts(computed, robot), directory)

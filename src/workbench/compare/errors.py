@@ -121,7 +121,7 @@ def all_worse(changes: Sequence[ErrorChange], factor: float = FACTOR, floor: flo
         A factor below 1, or a floor that is not positive.
     """
     if not 1.0 <= factor < math.inf:
-        raise WorkbenchError(f"factor {factor:g}; allowed: a number of at least 1", value=factor, limit=1.0)
+        raise WorkbenchError(f"--factor {factor:g}; allowed: a number of at least 1", value=factor, limit=1.0)
     if not 0.0 < floor < math.inf:
-        raise WorkbenchError(f"floor {floor:g}; allowed: a positive number", value=floor)
+        raise WorkbenchError(f"--floor {floor:g}; allowed: a positive number", value=floor)
     return [line for change in changes for line in change.worse(factor, floor)]

@@ -108,6 +108,7 @@ class CFormula:
         """
         scratch = Path(self._folder.name)
         worker = str(Path(__file__).with_name("c_worker.py"))
+        # -I: neither the current directory nor variables or packages of the user's are looked at
         arguments = [sys.executable, "-I", worker, str(self._library), self._symbol, str(scratch)]
         try:
             self._server = Served(arguments, scratch, START_S)

@@ -18,6 +18,7 @@ from workbench.delimited import read_table
 from workbench.errors import CandidateError, SpecError
 from workbench.foreign.fault import ForeignError
 from workbench.foreign.served import MOST_ERROR, Scratch
+from workbench.processes import environment
 
 INTERPRETERS = {".jl": ("julia", "--startup-file=no"), ".R": ("Rscript", "--vanilla"), ".r": ("Rscript", "--vanilla")}
 FORMAT = 1
@@ -84,6 +85,7 @@ class ProgramFormula:
         process = subprocess.Popen(
             command,
             cwd=self.path.parent,
+            env=environment(),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,

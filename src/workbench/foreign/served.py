@@ -23,6 +23,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.foreign.fault import ForeignError
+from workbench.processes import environment
 
 MARK = "\x01workbench "
 """begins every reply"""
@@ -45,6 +46,7 @@ class Served:
                 stdout=subprocess.PIPE,
                 stderr=complaints,
                 cwd=scratch,
+                env=environment(),
                 start_new_session=True,
                 encoding="utf-8",
                 errors="replace",

@@ -64,8 +64,8 @@ def engine_warnings() -> Iterator[list[str]]:
         mujoco.set_mju_user_warning(before)
 
 
-def compile_text(text: str, file: str) -> mujoco.MjModel:
-    """Compile an MJCF text.
+def compile_spec(spec: mujoco.MjSpec, file: str) -> mujoco.MjModel:
+    """Compile a specification.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def compile_text(text: str, file: str) -> mujoco.MjModel:
     """
     try:
         with engine_warnings():
-            model = mujoco.MjModel.from_xml_string(text)
+            model = spec.compile()
     except (ValueError, TypeError, MemoryError, mujoco.FatalError) as error:
         raise ModelError(f"{file}: MuJoCo does not compile it: {error}", file=file) from error
     numbers = [(name, getattr(model, name)) for name in FINITE]

@@ -1,32 +1,25 @@
-"""What a model file may not do: read other files, load code, or make the compiler run out of memory or time.
+"""What a model file may not do: load code, or make the compiler run out of memory or time.
+
+What it may read of other files is in `workbench.mjcf.files`.
 
 A model is refused for it before MuJoCo sees it, in one line that names the file's line.
 """
 
 from __future__ import annotations
 
-import errno
-import os
 import re
-import stat
-from pathlib import Path
 
 from workbench.errors import ModelError
 
-MAX_BYTES = 10_000_000
-"""A model larger than this is refused before it is parsed."""
-
 MAX_ELEMENTS = 20_000
+"""with all copies that ``<replicate>`` and ``<attach>`` make"""
+
 MAX_DEPTH = 100
 """Elements inside elements; MuJoCo's own parser gives up at 500."""
 
 REFUSED_TAGS = {
-    "include": "reads another file; put the whole model in one file",
     "plugin": "loads code into MuJoCo",
     "extension": "loads code into MuJoCo",
-    "attach": "takes its content from another model; put the whole model in one file",
-    "model": "reads another model; put the whole model in one file",
-    "replicate": "multiplies what it holds; write the copies out",
     "composite": "makes deformable bodies; none is covered",
     "flexcomp": "makes deformable bodies; none is covered",
     "flex": "is a deformable body; none is covered",
@@ -34,8 +27,8 @@ REFUSED_TAGS = {
 }
 """tag -> why it is refused"""
 
-DIRECTORIES = ("assetdir", "meshdir", "texturedir")
-"""attributes that say where other files lie; those that name a file begin with ``file``"""
+READERS = ("include", "model", "mesh", "texture", "hfield")
+"""tags that may name a file; attributes that do begin with ``file``"""
 
 LARGEST = {
     "width": 4096,
@@ -69,36 +62,6 @@ NAMING = ("name", "class", "childclass", "data", "model")
 """attributes of free text, where the word "inf" is no number"""
 
 
-def read_text(path: Path) -> str:
-    """Read an MJCF file; the text keeps its line endings and its byte order mark.
-
-    Raises
-    ------
-    ModelError
-        Not a regular file, not readable, not UTF-8, or too large. A pipe is refused, not waited for.
-    """
-    try:
-        # O_NONBLOCK: opening a pipe that nobody writes to would wait for ever
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-        with open(handle, "rb") as stream:
-            status = os.fstat(stream.fileno())
-            if not stat.S_ISREG(status.st_mode):
-                kind = "a directory" if stat.S_ISDIR(status.st_mode) else "no regular file"
-                raise ModelError(f"{path}: is {kind}; a model is an XML file", file=str(path))
-            if status.st_size > MAX_BYTES:
-                raise ModelError(f"{path}: {status.st_size} bytes; allowed: at most {MAX_BYTES}", file=str(path))
-            raw = stream.read(MAX_BYTES + 1)
-        return raw.decode()
-    except UnicodeDecodeError as error:
-        raise ModelError(f"{path}: not UTF-8 text (byte {error.start})", file=str(path)) from error
-    except OSError as error:
-        if error.errno == errno.EISDIR or path.is_dir():
-            raise ModelError(f"{path}: is a directory; a model is an XML file", file=str(path)) from error
-        raise ModelError(f"{path}: {error.strerror or error}", file=str(path)) from error
-    except ValueError as error:  # a null byte in the name
-        raise ModelError(f"{str(path)!r}: {error}", file=str(path)) from error
-
-
 def refuse_element(tag: str, attributes: dict[str, str], depth: int, count: int, where: str) -> None:
     """Refuse one start tag.
 
@@ -114,7 +77,7 @@ def refuse_element(tag: str, attributes: dict[str, str], depth: int, count: int,
     Raises
     ------
     ModelError
-        It reads another file, loads code, or asks for more memory than a model of a robot needs.
+        It loads code, names a file where none is read, or asks for more memory than a model of a robot needs.
     """
     if depth == 0 and tag != "mujoco":
         raise ModelError(f"{where}: the file's root is <{_short(tag)}>; an MJCF model begins with <mujoco>")
@@ -125,10 +88,10 @@ def refuse_element(tag: str, attributes: dict[str, str], depth: int, count: int,
     if tag in REFUSED_TAGS:
         raise ModelError(f"{where}: <{tag}> {REFUSED_TAGS[tag]}", element=tag)
     for key, value in attributes.items():
-        if key.startswith("file") or key in DIRECTORIES:
+        if key.startswith("file") and tag not in READERS:
             raise ModelError(f'{where}: <{tag} {key}="{_short(value)}"> reads another file', element=tag, attribute=key)
         limit = LARGEST.get(key) or LARGEST_OF_TAG.get((tag, key)) or (LARGEST_USER if key[:6] == "nuser_" else None)
-        if limit is not None and any(_number(token) > limit for token in value.split()):
+        if limit is not None and any(number_in(token) > limit for token in value.split()):
             raise ModelError(
                 f'{where}: <{tag} {key}="{_short(value)}">; allowed: at most {limit}', element=tag, attribute=key
             )
@@ -144,7 +107,8 @@ def not_finite(attributes: dict[str, str]) -> tuple[str, str] | None:
     return None
 
 
-def _number(token: str) -> float:
+def number_in(token: str) -> float:
+    """A number as it is written; 0 where it is none."""
     try:
         return float(token)
     except ValueError:  # MuJoCo will say what is wrong with it
@@ -153,7 +117,7 @@ def _number(token: str) -> float:
 
 def _memory(value: str) -> float:
     unit = value[-1:].upper()
-    return _number(value[:-1]) * MEMORY_UNITS[unit] if unit in MEMORY_UNITS else _number(value)
+    return number_in(value[:-1]) * MEMORY_UNITS[unit] if unit in MEMORY_UNITS else number_in(value)
 
 
 def _short(text: str) -> str:

@@ -36,6 +36,10 @@ class Element:
     start: int
     end: int
     line: int
+    close: int = -1
+    """where its end tag begins; `end` for a tag that closes itself"""
+    stop: int = -1
+    """where the element ends"""
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,8 @@ class Edit:
     """True: passed over where the file does not write it"""
 
 
-def scan(text: str, file: str) -> list[Element]:
-    """List the start tags of an MJCF text.
+def scan(text: str, file: str, included: bool = False) -> list[Element]:
+    """List the start tags of an MJCF text; of one that is *included*, the root may have any name.
 
     Raises
     ------
@@ -64,8 +68,9 @@ def scan(text: str, file: str) -> list[Element]:
     """
     raw = text.encode()
     found: list[tuple[str, str, str, str, int, int]] = []
+    ends: dict[int, int] = {}
     bodies: list[str] = []
-    path: list[str] = []
+    path: list[tuple[str, int]] = []
     names: set[str] = set()
     suspects: list[tuple[str, str, str, int]] = []
     suspicious = SUSPECT.search(text) is not None
@@ -73,9 +78,9 @@ def scan(text: str, file: str) -> list[Element]:
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
         line = parser.CurrentLineNumber
-        refuse_element(tag, attributes, len(path), len(found), f"{file}:{line}")
+        refuse_element("mujoco" if included and not path else tag, attributes, len(path), len(found), f"{file}:{line}")
         name = attributes.get("name", "")
-        path.append(tag)
+        path.append((tag, len(found)))
         if tag == "body":
             bodies.append(name)
         if suspicious:
@@ -83,11 +88,11 @@ def scan(text: str, file: str) -> list[Element]:
             value = not_finite(attributes)
             if value:
                 suspects.append((tag, *value, line))
-        section = path[1] if len(path) > 1 else ""
+        section = path[1][0] if len(path) > 1 else ""
         found.append((tag, name, bodies[-1] if bodies else "", section, parser.CurrentByteIndex, line))
 
     def finish(tag: str) -> None:
-        path.pop()
+        ends[path.pop()[1]] = parser.CurrentByteIndex
         if tag == "body":
             bodies.pop()
 
@@ -106,21 +111,36 @@ def scan(text: str, file: str) -> list[Element]:
     for tag, key, value, line in suspects:
         if value not in names:  # "inf" may be the name of a material
             raise ModelError(f'{file}:{line}: <{tag} {key}="{value}"> is not finite', file=file, attribute=key)
-    return _located(text, raw, found, file)
+    return _located(text, raw, found, ends, file)
 
 
-def _located(text: str, raw: bytes, found: list[tuple[str, str, str, str, int, int]], file: str) -> list[Element]:
+def _located(
+    text: str, raw: bytes, found: list[tuple[str, str, str, str, int, int]], ends: dict[int, int], file: str
+) -> list[Element]:
     """Turn byte offsets into places in the text."""
+    places = _places(text, raw, sorted({offset for *_, offset, _ in found} | set(ends.values())))
     elements = []
-    start, before = 0, 0
-    for tag, name, body, section, offset, line in found:
-        start += len(raw[before:offset].decode())
-        before = offset
+    for number, (tag, name, body, section, offset, line) in enumerate(found):
+        start, close = places[offset], places[ends[number]]
         match = TAG.match(text, start)
         if match is None:  # expat accepted it, so this is a form of tag that no MJCF uses
             raise ModelError(f"{file}:{line}: cannot read the tag <{tag}>", file=file)
-        elements.append(Element(tag, name, body, section, start, match.end(), line))
+        alone = match.group().endswith("/>")
+        close, stop = (match.end(),) * 2 if alone else (close, text.index(">", close) + 1)
+        elements.append(Element(tag, name, body, section, start, match.end(), line, close, stop))
     return elements
+
+
+def _places(text: str, raw: bytes, offsets: list[int]) -> dict[int, int]:
+    """Places in the text of sorted byte offsets."""
+    if len(text) == len(raw):
+        return {offset: offset for offset in offsets}
+    places, place, before = {}, 0, 0
+    for offset in offsets:
+        place += len(raw[before:offset].decode())
+        before = offset
+        places[offset] = place
+    return places
 
 
 def find(elements: list[Element], tag: str, name: str) -> Element | None:
@@ -263,3 +283,13 @@ def number(value: float) -> str:
     if value == 0:
         return "0"
     return f"{value:.0f}" if value == int(value) and abs(value) < 1e15 else repr(value)
+
+
+def attributes_of(text: str, element: Element) -> dict[str, str]:
+    """The attributes of a start tag, character references resolved."""
+    found: dict[str, str] = {}
+    parser = expat.ParserCreate("utf-8")
+    parser.StartElementHandler = lambda tag, attributes: found.update(attributes)
+    tag = text[element.start : element.end]
+    parser.Parse((tag if tag.endswith("/>") else f"{tag[:-1]}/>").encode(), True)
+    return found

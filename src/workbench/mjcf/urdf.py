@@ -13,8 +13,10 @@ from dataclasses import dataclass, field
 import mujoco
 
 from workbench.errors import ModelError, did_you_mean
-from workbench.mjcf.compile import compile_text
+from workbench.mjcf.assets import parse
+from workbench.mjcf.compile import compile_spec
 from workbench.mjcf.loop_table import LoopTable
+from workbench.mjcf.source import Source
 from workbench.mjcf.urdf_writer import Writer, same_robot
 
 SHAPES = ("visual", "collision", "material")
@@ -85,7 +87,7 @@ def import_urdf(text: str, file: str, table: LoopTable) -> Imported:
     spherical = {name for name, kind in changed.items() if kind == "SPHERICAL"}
     writer = Writer(model, spherical, massless, file)
     written = writer.text(root.get("name", "robot"), table.loops, frames, mimics)
-    same_robot(model, compile_text(written, file), massless, file)
+    same_robot(model, compile_spec(parse(Source(file, written)), file), massless, file)
     joints = tuple(
         model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] >= mujoco.mjtJoint.mjJNT_SLIDE.value
     )
@@ -169,4 +171,4 @@ def _compiled(root: ET.Element, file: str) -> mujoco.MjModel:
     options = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler")
     for key, value in (("fusestatic", "false"), ("discardvisual", "true"), ("balanceinertia", "false")):
         options.set(key, value)
-    return compile_text(ET.tostring(root, encoding="unicode"), file)
+    return compile_spec(parse(Source(file, ET.tostring(root, encoding="unicode"))), file)

@@ -1,4 +1,7 @@
-"""Sinusoids of joints and platform, with analytic derivatives ([Almeida2010] eq. (16)-(18) and sums of it)."""
+"""Sinusoidal motions of joints and of the platform, with analytic derivatives.
+
+[Almeida2010] eq. (16)-(18), and sums of such terms.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """The only place that calls the engine: loop closure and constraint-projected inverse dynamics of an MJCF."""
 
-from workbench.reference.mujoco_reference import Mobility, MujocoReference, ReferenceResult
+from workbench.reference.mujoco_reference import MujocoReference
+from workbench.reference.result import Mobility, ReferenceResult
 
 __all__ = ["Mobility", "MujocoReference", "ReferenceResult"]

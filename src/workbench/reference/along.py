@@ -16,8 +16,8 @@ from workbench.arrays import FloatArray
 from workbench.errors import MotionError
 from workbench.reference.continuation import CORRECTION, LONGEST_STEP, NEGLIGIBLE, SMALLEST_STEP, Assembly, Continuation
 from workbench.reference.engine import Evaluator
+from workbench.reference.kinds import SCALAR
 from workbench.reference.structure import Structure
-from workbench.reference.tables import BALL
 
 SAME = 1e-6
 """rad or m: configurations nearer than this are one; at a condition of 1e6 closures differ by 1e-7, and assemblies by
@@ -102,13 +102,13 @@ class OrderedClosure(Continuation):
     def _apart(self, one: FloatArray, other: FloatArray) -> FloatArray:
         """How far configurations ``(k, nq)`` are apart, ``(k,)``: hinges, slides, and what ball joints carry.
 
-        A rod's spin about its own axis is idle and depends on the way; so ball joints count by where they take joints
-        and loop closures, not by their turns.
+        A rod's spin about its own axis is idle and depends on the way; so ball and free joints count by where they take
+        joints and loop closures, not by their turns.
         """
         kinds, addresses, _ = self.joints
-        scalar = addresses[kinds != BALL]
+        scalar = addresses[kinds == SCALAR]
         distance: FloatArray = np.sqrt(np.sum((one[:, scalar] - other[:, scalar]) ** 2, axis=1))
-        if (kinds == BALL).any():
+        if (kinds != SCALAR).any():
             gap = np.linalg.norm(self._points(one) - self._points(other), axis=2).max(axis=1)
             distance = np.hypot(distance, gap)
         return distance
@@ -150,7 +150,7 @@ def refuse_jumps(
         Naming the sample, the joint, its change and what would be allowed.
     """
     kinds, addresses, dofs = joints
-    scalar = np.flatnonzero(kinds != BALL)
+    scalar = np.flatnonzero(kinds == SCALAR)
     if len(t) < 2 or not len(scalar):
         return
     h = np.diff(t)[:, None]

@@ -15,12 +15,12 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError, WorkbenchError
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.compile import custom_text, engine_warnings
 from workbench.reference.closure import LoopCloser, constraint_jacobian
-from workbench.reference.continuation import CLOSED
 from workbench.reference.engine import Engine
-from workbench.reference.mujoco_reference import Mobility
-from workbench.reference.structure import Structure, read_structure
+from workbench.reference.result import Mobility
+from workbench.reference.structure import Structure, structure_of
+from workbench.reference.tolerance import rank_of
 from workbench.robots.assumptions.check import Assumption, check_assumptions
 from workbench.robots.load import LoadedModel, load_model, open_model
 from workbench.robots.robot_file import RobotFile
@@ -158,6 +158,18 @@ def _counted(closed_form: Any) -> dict[str, int]:
     return count() if count else {}
 
 
+def names_itself(path: str | Path) -> bool:
+    """Whether a file says which closed form it is, or at least what its platform is.
+
+    Raises
+    ------
+    ModelError
+        As `check_model`.
+    """
+    loaded = open_model(path)
+    return loaded.description is not None or custom_text(loaded.model, "platform_site") is not None
+
+
 def _name(loaded: LoadedModel) -> str | None:
     return loaded.description.name if loaded.description is not None else None
 
@@ -167,8 +179,8 @@ class _Closed:
 
     def __init__(self, loaded: LoadedModel) -> None:
         self.loaded = loaded
-        self.structure: Structure = read_structure(loaded.model, loaded.file)
-        self.engine = Engine(loaded.model)
+        self.structure: Structure = structure_of(loaded)
+        self.engine = Engine(loaded.model, frames=self.structure.frames)
         self.closer = LoopCloser(self.engine, self.structure)
         self.jacobian, residuals = constraint_jacobian(
             self.engine, self.structure, self.closer.joints, self.closer.home[None, :]
@@ -178,7 +190,7 @@ class _Closed:
     def mobility(self) -> Mobility:
         """Freedoms by rank at home."""
         structure, loops = self.structure, self.jacobian[: self.structure.loop_rows]
-        rank = int(np.linalg.matrix_rank(loops, tol=1e-9)) if len(loops) else 0
+        rank = rank_of(loops, self.closer.tolerance)
         freedoms, idle = loops.shape[1], len(structure.idle)
         return Mobility(freedoms - rank - idle, freedoms, structure.loop_rows, rank, structure.loop_rows - rank, idle)
 
@@ -190,9 +202,10 @@ class _Closed:
     def problems(self) -> list[str]:
         """What the projection could not work with."""
         found = []
-        if not self.residual <= CLOSED:
+        if not self.residual <= self.closer.tolerance.residual:
             found.append(
-                f"{self.loaded.file}: the loops stay open by {self.residual:.3g} m at home (allowed: {CLOSED:g})"
+                f"{self.loaded.file}: the loops stay open by {self.residual:.3g} m at home (allowed:"
+                f" {self.closer.tolerance.residual:.3g})"
             )
         mobility, active = self.mobility().mobility, len(self.structure.actuated)
         if mobility > active or (self.loaded.closed_form is not None and self.excess):

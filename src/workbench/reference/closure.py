@@ -5,17 +5,20 @@ How samples are reached, and what keeps them on the branch, stands in `workbench
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
 from workbench.reference.along import OrderedClosure
-from workbench.reference.continuation import ASTRAY, CLOSED, NEWTON_STEPS, Assembly
+from workbench.reference.continuation import ASTRAY, NEWTON_STEPS, Assembly
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import integrate, newton_step
 from workbench.reference.rows import constraint_rows
 from workbench.reference.structure import Structure
 from workbench.reference.tables import tables_of
+from workbench.reference.tolerance import KEY, RANK
 
 FREE_STEPS = 60
 LONGEST_FREE_STEP = 0.2
@@ -27,22 +30,62 @@ class LoopCloser(OrderedClosure):
 
     def __init__(self, engine: Engine, structure: Structure) -> None:
         super().__init__(engine, structure)
-        home = structure.home_qpos[None, :].copy()
-        found = self._newton_alone(home, home[:, structure.actuated_qpos])
-        if not found.residual[0] <= CLOSED:
+        self._home = self._close_home(structure.home_qpos[None, :].copy())
+        self.home = self._home.qpos[0]
+        self.start = self.home[structure.actuated_qpos]
+
+    def _close_home(self, home: FloatArray) -> Assembly:
+        """Close the pose ``(1, nq)`` from which all others are reached."""
+        found = self._newton_alone(home.copy(), home[:, self.structure.actuated_qpos])
+        if not found.residual[0] <= self.tolerance.closed:
             # edited lengths can put the file's home pose out of reach: move the actuated joints too, but little
             closed, residual = self._close_freely(home.copy())
-            if not residual[0] <= CLOSED:
-                raise ModelError(
-                    f"{structure.file}: the loops cannot be closed from the home pose; {self._worst_block(closed)}"
-                    f" stays open by {residual[0]:.3g} m (allowed: {CLOSED:g})",
-                    file=structure.file,
-                    value=float(residual[0]),
-                )
-            found = self._newton_alone(closed, closed[:, structure.actuated_qpos])
-        self._home = found
-        self.home = found.qpos[0]
-        self.start = self.home[structure.actuated_qpos]
+            if self.tolerance.closed < residual <= self.tolerance.allowed:
+                self._close_by_digits()
+            elif not residual <= self.tolerance.closed:
+                self._refuse_home(home, closed, residual)
+            found = self._newton_alone(closed.copy(), closed[:, self.structure.actuated_qpos])
+        if not self.tolerance.few_digits and self._locked(found.qpos[0]):
+            # axes that are parallel to six digits only leave no freedom, where the robot that is meant has some
+            self._close_by_digits()
+            found = self._newton_alone(found.qpos.copy(), found.qpos[:, self.structure.actuated_qpos])
+        return found
+
+    def _close_by_digits(self) -> None:
+        self.tolerance = dataclasses.replace(self.tolerance, few_digits=True)
+
+    def _locked(self, qpos: FloatArray) -> bool:
+        """Whether the loops leave fewer freedoms than there are actuators, and more of them with fewer digits."""
+        jacobian = self.jacobian(qpos)
+        if not len(jacobian):
+            return False
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        freedoms = jacobian.shape[1]
+        few = self.tolerance.allowed / self.tolerance.size
+        strict, coarse = (freedoms - int(np.count_nonzero(values > limit * values[0])) for limit in (RANK, few))
+        return bool(strict < min(coarse, len(self.structure.actuated)))
+
+    def _refuse_home(self, home: FloatArray, closed: FloatArray, residual: float) -> None:
+        """Describe the file as it is drawn, then how near the loops come to closing."""
+        structure, allowed = self.structure, self.tolerance
+        drawn = np.abs(constraint_jacobian(self.engine, structure, self.joints, home)[1])
+        worst = int(np.searchsorted(structure.block_rows, int(np.argmax(drawn)), side="right")) - 1
+        raise ModelError(
+            f"{structure.file}: the loops cannot be closed from the home pose; equality"
+            f' "{structure.block_names[worst]}" is open by {float(drawn.max()):.3g} m as drawn, and the nearest pose'
+            f" leaves {residual:.3g} m (allowed: {allowed.closed:.3g}, or {allowed.allowed:.3g} for loops that agree"
+            f' only to some digits; <text name="{KEY}"> sets the latter)',
+            file=structure.file,
+            element=structure.block_names[worst],
+            value=residual,
+            drawn=float(drawn.max()),
+            qpos=closed[0].tolist(),
+        )
+
+    @property
+    def at_home(self) -> Assembly:
+        """The pose from which all others are reached, and what is known of it."""
+        return self._home
 
     def close(self, q: FloatArray) -> Assembly:
         """Close the loops for actuated coordinates ``(n, na)``, SI, any order of samples.
@@ -64,19 +107,26 @@ class LoopCloser(OrderedClosure):
         integrate(self.home, way, self.joints, moved)
         return self.jacobian(self._close_freely(moved[None, :])[0][0])
 
-    def _close_freely(self, qpos: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Close one configuration ``(1, nq)`` by least-norm Newton steps on all joints, the actuated ones included."""
-        structure = self.structure
-        residual = np.full(1, np.inf)
+    def _close_freely(self, qpos: FloatArray) -> tuple[FloatArray, float]:
+        """Close one configuration ``(1, nq)`` by least-norm Newton steps on all joints, the actuated ones included.
+
+        Returns the best pose met and its residual.
+        """
+        best, least = qpos.copy(), np.inf
         for _ in range(FREE_STEPS):
-            jacobian, open_by = constraint_jacobian(self.engine, structure, self.joints, qpos)
-            residual = np.abs(open_by).max(keepdims=True)
-            if residual[0] <= 0.01 * CLOSED or not np.isfinite(residual[0]):
+            jacobian, open_by = constraint_jacobian(self.engine, self.structure, self.joints, qpos)
+            residual = float(np.abs(open_by).max(initial=0.0))
+            if not np.isfinite(residual):
                 break
-            step = -np.linalg.lstsq(jacobian, open_by, rcond=1e-9)[0]
-            step *= min(1.0, LONGEST_FREE_STEP / max(float(np.linalg.norm(step)), 1e-300))
+            if residual < least:
+                best, least = qpos.copy(), residual
+            if residual <= self.tolerance.floor:
+                break
+            step = -np.linalg.lstsq(jacobian, open_by, rcond=self.tolerance.relative)[0]
+            length = float(np.linalg.norm(step * self._weights[0]))
+            step *= min(1.0, LONGEST_FREE_STEP / max(length, 1e-300))
             integrate(qpos[0], step, self.joints, qpos[0])
-        return qpos, residual
+        return best, least
 
     def _newton(self, evaluator: Evaluator, start: FloatArray, aim: FloatArray) -> Assembly:
         """Newton on the passive joints of up to a block of configurations; the actuated coordinates stay."""
@@ -86,7 +136,8 @@ class LoopCloser(OrderedClosure):
         qpos = evaluator.qpos
         qpos[:count] = start
         # the floor: a closed sample gets one more step, which takes it to rounding; then it stays
-        limits = (CLOSED, 0.01 * CLOSED, ASTRAY)
+        tolerance = self.tolerance
+        limits = (tolerance.residual, tolerance.floor, ASTRAY * tolerance.size, tolerance.few_digits)
         active = np.arange(count)
         for _ in range(NEWTON_STEPS):
             poses = evaluator.place(active)
@@ -105,21 +156,12 @@ class LoopCloser(OrderedClosure):
         )
         raise MotionError(
             f"sample {sample}, joint {self.structure.joint_names[joint]}: the loops cannot be closed at {shown}; the"
-            f" way from the home pose ends at {reached[joint]:.6g}",
+            f" way there ends at {reached[joint]:.6g}",
             sample=sample,
             joint=self.structure.joint_names[joint],
             value=target.tolist(),
             reached=reached.tolist(),
         )
-
-    def _worst_block(self, qpos: FloatArray) -> str:
-        structure = self.structure
-        poses = self.engine.poses(qpos)
-        gaps = [
-            float(np.linalg.norm(poses.site_xpos[0, b[3]] - poses.site_xpos[0, b[4]])) if b[0] < 2 else 0.0
-            for b in structure.blocks
-        ]
-        return f'equality "{structure.block_names[int(np.argmax(gaps))]}"' if gaps else "the model"
 
 
 def constraint_jacobian(

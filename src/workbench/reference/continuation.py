@@ -18,9 +18,7 @@ from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import predict
 from workbench.reference.structure import Structure
 from workbench.reference.tables import tables_of
-
-CLOSED = 1e-13
-"""Largest residual of a closed loop, metres (for turns: radians)."""
+from workbench.reference.tolerance import tolerance_of, weights_of
 
 CORRECTION = 0.1
 """A continuation step is accepted when Newton moves the configuration by less than this fraction of the step."""
@@ -112,6 +110,9 @@ class Continuation(ABC):
         self.structure = structure
         self.tables = tables_of(engine.model, structure)
         self.joints = self.tables.joints
+        self.tolerance = tolerance_of(engine.model, structure.home_qpos, structure.file)
+        # a step in metres counts by the robot's size, one in radians as it is
+        self._weights = weights_of(engine.model, self.tolerance.size)
 
     def follow(self, target: FloatArray) -> Assembly:
         """Reach given coordinates ``(n, m)``, SI, any order of samples.
@@ -210,7 +211,8 @@ class Continuation(ABC):
         done, step = np.zeros(len(target)), np.ones(len(target))
         active = np.arange(len(target))
         while len(active):
-            speed = np.linalg.norm(np.matmul(here.tangent[active], way[active, :, None])[:, :, 0], axis=1)
+            rates = np.matmul(here.tangent[active], way[active, :, None])[:, :, 0] * self._weights[0]
+            speed = np.linalg.norm(rates, axis=1)
             with np.errstate(divide="ignore"):
                 longest = ALMOST * LONGEST_STEP / speed
             part = np.minimum(np.minimum(step[active], 1.0 - done[active]), longest)
@@ -218,9 +220,9 @@ class Continuation(ABC):
             aim = np.where(last, target[active], origin[active] + way[active] * (done[active] + part)[:, None])
             moved, predicted = self._predict(here, active, way[active] * part[:, None])
             closed = self._newton(evaluator, predicted, aim)
-            correction = np.sqrt(np.sum((closed.qpos - predicted) ** 2, axis=1))
+            correction = np.sqrt(np.sum(((closed.qpos - predicted) * self._weights[1]) ** 2, axis=1))
             small = correction <= np.maximum(CORRECTION * moved, NEGLIGIBLE)
-            accepted = (closed.residual <= CLOSED) & small & (moved <= LONGEST_STEP)
+            accepted = (closed.residual <= self.tolerance.residual) & small & (moved <= LONGEST_STEP)
             accepted &= self._on_branch(closed)
             here.put(active[accepted], closed, accepted)
             done[active[accepted]] += part[accepted]
@@ -240,7 +242,7 @@ class Continuation(ABC):
     def _predict(self, here: Assembly, rows: np.ndarray, change: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Tangent predictor: distance moved by a change of the given coordinates, and where that leads."""
         moved, out = np.empty(len(rows)), np.empty((len(rows), here.qpos.shape[1]))
-        predict(here.qpos[rows], here.tangent[rows], change, self.joints, out, moved)
+        predict(here.qpos[rows], here.tangent[rows], change, self.joints, self._weights[0], out, moved)
         return moved, out
 
     def _newton_alone(self, qpos: FloatArray, aim: FloatArray) -> Assembly:

@@ -7,6 +7,7 @@ block's results do not depend on which thread computes it.
 from __future__ import annotations
 
 import copy
+import dataclasses
 import os
 import queue
 from collections.abc import Callable
@@ -20,6 +21,7 @@ from mujoco.batch import Batch
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, ParameterError
 from workbench.mjcf.compile import engine_warnings
+from workbench.reference.frames import Frames, place_frames
 
 LUMPED_INERTIA = 2e-15
 """kg m^2: what stands for "no rotational inertia"; MuJoCo refuses less than 1e-15. Against the smallest bar of the two
@@ -28,6 +30,9 @@ papers (1e-3 kg m^2) it is worth 1e-12."""
 SAME_BODY = 1e-12
 """Relative: masses and inertias of two compilations that differ by more are those of two robots."""
 
+NONE = Frames.of([])
+"""No closure by bodies."""
+
 BLOCK = 512
 """Samples evaluated at a time; some 3 kB each."""
 
@@ -35,7 +40,7 @@ MOST_THREADS = 256
 
 
 @engine_warnings()
-def without_bar_inertia(text: str, bodies: tuple[str, ...], file: str) -> mujoco.MjModel:
+def without_bar_inertia(spec: mujoco.MjSpec, bodies: tuple[str, ...], file: str) -> mujoco.MjModel:
     """Compile the model with the rotational inertia of the named bodies removed: the lumped-mass assumption.
 
     The specification is changed and compiled again; writing into a compiled model can be silently wrong.
@@ -45,7 +50,6 @@ def without_bar_inertia(text: str, bodies: tuple[str, ...], file: str) -> mujoco
     ModelError
         Something in the file (a ``<compiler>`` option) gives the second model other masses than the first.
     """
-    spec = mujoco.MjSpec.from_string(text)
     model = spec.compile()
     for name in bodies:
         body, index = spec.body(name), model.body(name).id
@@ -104,7 +108,7 @@ class Dynamics:
     bias: FloatArray
     """Coriolis, centrifugal and gravity forces, ``(n, nv)``"""
     passive: FloatArray
-    """damping, ``(n, nv)``"""
+    """damping, springs, fluid, gravity compensation, ``(n, nv)``"""
     body_com: FloatArray
     energy: FloatArray
     """potential and kinetic, ``(n, 2)``, J"""
@@ -122,7 +126,7 @@ DYNAMICS = ("cdof_dot", "M", "qfrc_bias", "qfrc_passive", "xipos", "energy")
 class Evaluator:
     """Evaluates up to `BLOCK` samples at a time; one thread's own."""
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, frames: Frames = NONE) -> None:
         # constraint forces are solved for elsewhere, so the engine need not set them up; nothing else depends on this
         flags = mujoco.mjtDisableBit
         lean = copy.copy(model)
@@ -135,10 +139,29 @@ class Evaluator:
         """the configurations that `place` evaluates, ``(BLOCK, nq)``, to be written into"""
         self._qvel = self._batch.qvel
         self._all = np.arange(BLOCK, dtype=np.int32)
+        self._frames = frames
+        if len(frames):
+            self._bodies = self._batch.bind("xpos"), self._batch.bind("xquat")
+            self._sites = self._poses.site_xpos, self._poses.site_xquat
+            self._places = tuple(np.zeros((BLOCK, model.nsite + len(frames), width)) for width in (3, 4))
+            # for the kernels, arrays that may not be written to are another type; the engine's own may not
+            shown = [array.view() for array in self._places]
+            for array in shown:
+                array.flags.writeable = False
+            self._poses = dataclasses.replace(self._poses, site_xpos=shown[0], site_xquat=shown[1])
 
     def place(self, ids: np.ndarray) -> Poses:
         """Evaluate positions of the listed rows of `qpos`; the arrays are valid until the next call."""
         self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
+        return self._with_frames(ids)
+
+    def _with_frames(self, ids: np.ndarray) -> Poses:
+        """The poses, closures by bodies placed behind the sites."""
+        frames = self._frames
+        if len(frames):
+            place_frames(
+                ids, frames.bodies, frames.positions, frames.quaternions, *self._bodies, *self._sites, *self._places
+            )
         return self._poses
 
     def move(self, qpos: FloatArray, qvel: FloatArray) -> tuple[Poses, Dynamics]:
@@ -147,17 +170,18 @@ class Evaluator:
         self.qpos[:count] = qpos
         self._qvel[:count] = qvel
         self._batch.forward(self._all[:count], stage=mujoco.mjtStage.mjSTAGE_VEL.value)
-        return self._poses, self._dynamics
+        return self._with_frames(self._all[:count]), self._dynamics
 
 
 class Engine:
     """A model and its evaluators; results do not depend on the number of threads."""
 
-    def __init__(self, model: mujoco.MjModel, threads: int = 1) -> None:
+    def __init__(self, model: mujoco.MjModel, threads: int = 1, frames: Frames = NONE) -> None:
         if not 1 <= threads <= MOST_THREADS:
             raise ParameterError(f"threads = {threads}; allowed: 1 to {MOST_THREADS}", value=threads)
         self.model = model
         self.threads = threads
+        self._frames = frames
         self._idle: queue.SimpleQueue[Evaluator] = queue.SimpleQueue()
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
@@ -198,7 +222,7 @@ class Engine:
         try:
             return self._idle.get_nowait()
         except queue.Empty:
-            return Evaluator(self.model)
+            return Evaluator(self.model, self._frames)
 
     def _workers(self) -> ThreadPoolExecutor:
         # a forked process has no threads, whatever its parent had

@@ -9,6 +9,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError
 from workbench.reference.structure import Structure
+from workbench.reference.tolerance import KEY, Tolerance
 
 RANK_TOLERANCE = 1e-9
 """A singular value of the passive loop Jacobian below this fraction of the largest one counts as zero."""
@@ -19,11 +20,16 @@ NEARBY = 1e-2
 SHOWN = 0.1
 """A joint is named when it takes part in a loose motion by more than this fraction of the one that moves most."""
 
+DIGITS_AT_MOST = 1e-2
+"""Of the robot's size: a tolerance beyond this is not proposed; the mechanism is another one."""
+
 Reclose = Callable[[FloatArray], FloatArray]
 """A velocity ``(nv,)`` to move the home pose by -> constraint Jacobian ``(m, nv)`` of the closed pose nearest to it."""
 
 
-def check_freedoms(structure: Structure, jacobian: FloatArray, reclose: Reclose) -> None:
+def check_freedoms(
+    structure: Structure, jacobian: FloatArray, reclose: Reclose, tolerance: float = RANK_TOLERANCE
+) -> None:
     """Refuse a mechanism that has freedoms which no actuator holds.
 
     Parameters
@@ -34,6 +40,8 @@ def check_freedoms(structure: Structure, jacobian: FloatArray, reclose: Reclose)
         Constraint Jacobian ``(m, nv)`` of the home pose.
     reclose
         The same for a closed pose nearby.
+    tolerance
+        The fraction of the largest singular value below which one counts as zero.
 
     Raises
     ------
@@ -41,14 +49,14 @@ def check_freedoms(structure: Structure, jacobian: FloatArray, reclose: Reclose)
         A freedom is loose: the message gives the joints that move and by how much. Or only this pose is to blame: two
         assembly branches meet in it.
     """
-    loose, direction = _loose(structure, jacobian)
+    loose, direction = _loose(structure, jacobian, tolerance)
     if not loose:
         return
     shown = _shown(structure, direction)
-    rank = int(np.linalg.matrix_rank(jacobian, tol=RANK_TOLERANCE)) if len(jacobian) else jacobian.shape[1]
+    rank = int(np.linalg.matrix_rank(jacobian, tol=tolerance)) if len(jacobian) else jacobian.shape[1]
     null = np.linalg.svd(jacobian, full_matrices=True)[2][rank:]
     ways = [sign * NEARBY * way for way in ([*null, null.sum(axis=0)] if len(null) else []) for sign in (1.0, -1.0)]
-    if any(_loose(structure, reclose(way))[0] < loose for way in ways):
+    if any(_loose(structure, reclose(way), tolerance)[0] < loose for way in ways):
         raise ModelError(
             f"{structure.file}: two assembly branches meet in the pose from which the loops are closed (there {shown}"
             " can move either way with the actuators at rest); begin from another pose, by a keyframe or initial"
@@ -64,13 +72,37 @@ def check_freedoms(structure: Structure, jacobian: FloatArray, reclose: Reclose)
     )
 
 
-def _loose(structure: Structure, jacobian: FloatArray) -> tuple[int, FloatArray]:
+def refuse_locked(structure: Structure, jacobian: FloatArray, tolerance: Tolerance) -> None:
+    """Refuse loops that leave no freedom; where a few digits are to blame, say with which tolerance they leave one.
+
+    Raises
+    ------
+    ModelError
+        Always.
+    """
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    nearly = 1.5 * float(values[jacobian.shape[1] - 1] / values[0]) * tolerance.size
+    way = (
+        f"; if axes or anchors in the file agree only to some digits, it needs a closure tolerance of {nearly:.1e} m"
+        f' (<text name="{KEY}">)'
+        if nearly < DIGITS_AT_MOST * tolerance.size
+        else ""
+    )
+    raise ModelError(
+        f"{structure.file}: the loops leave no freedom, so that {', '.join(structure.joint_names)} cannot move;"
+        f" take an equality out, or add a joint{way}",
+        file=structure.file,
+        tolerance=nearly,
+    )
+
+
+def _loose(structure: Structure, jacobian: FloatArray, tolerance: float) -> tuple[int, FloatArray]:
     """Number of passive freedoms that the constraints leave, and one motion ``(np,)`` that they allow."""
     passive = jacobian[:, structure.passive]
     if not passive.shape[1]:
         return 0, np.zeros(0)
     values, vectors = np.linalg.svd(passive)[1:]
-    return passive.shape[1] - int(np.count_nonzero(values > RANK_TOLERANCE * max(values, default=1.0))), vectors[-1]
+    return passive.shape[1] - int(np.count_nonzero(values > tolerance * max(values, default=1.0))), vectors[-1]
 
 
 def _shown(structure: Structure, direction: FloatArray) -> str:

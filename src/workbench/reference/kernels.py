@@ -10,19 +10,23 @@ import math
 import numpy as np
 
 from workbench.compiled import compiled, inlined
+from workbench.reference.kinds import BALL, CONNECT, FREE, WELD
 from workbench.reference.linear import factor, solve, solve_transposed
 from workbench.reference.rows import acceleration_rows, body_motion, constraint_rows, point_motion
-from workbench.reference.structure import SPIN
-from workbench.reference.tables import BALL
 
 
 @compiled
 def integrate(qpos, velocity, joints, out):  # type: ignore[no-untyped-def]
-    """Move one configuration along a velocity (hinge, slide, ball), for unit time; *out* may be *qpos*."""
+    """Move one configuration along a velocity (hinge, slide, ball, free), for unit time; *out* may be *qpos*."""
     kinds, qpos_of, dof_of = joints
     for j in range(kinds.shape[0]):
         a, d = qpos_of[j], dof_of[j]
-        if kinds[j] == BALL:
+        if kinds[j] == FREE:
+            # translation in the world's frame, turning in the body's own, as for a ball
+            for i in range(3):
+                out[a + i] = qpos[a + i] + velocity[d + i]
+            a, d = a + 3, d + 3
+        if kinds[j] in (BALL, FREE):
             x, y, z = velocity[d], velocity[d + 1], velocity[d + 2]
             angle = math.sqrt(x * x + y * y + z * z)
             half = 0.5 * angle
@@ -41,28 +45,30 @@ def integrate(qpos, velocity, joints, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def predict(start, tangent, change, joints, out, moved):  # type: ignore[no-untyped-def]
+def predict(start, tangent, change, joints, weights, out, moved):  # type: ignore[no-untyped-def]
     """Follow the tangent: configurations ``(n, nq)`` after a change ``(n, na)`` of the actuated coordinates.
 
-    ``tangent (n, nv, na)`` holds velocities per unit actuated velocity; ``moved (n,)`` receives the distance.
+    ``tangent (n, nv, na)`` holds velocities per unit actuated velocity; ``moved (n,)`` receives the distance, in which
+    velocities count by their ``weights (nv,)``.
     """
     step = np.empty(tangent.shape[1])
     for s in range(start.shape[0]):
-        moved[s] = _along(tangent[s], change[s], step)
+        _along(tangent[s], change[s], step)
+        squared = 0.0
+        for d in range(step.shape[0]):
+            squared += (step[d] * weights[d]) ** 2
+        moved[s] = math.sqrt(squared)
         integrate(start[s], step, joints, out[s])
 
 
 @inlined
 def _along(tangent, rates, velocity):  # type: ignore[no-untyped-def]
-    """Fill velocity ``(nv,)`` = tangent rates; returns its norm."""
-    squared = 0.0
+    """Fill velocity ``(nv,)`` = tangent rates."""
     for d in range(tangent.shape[0]):
         value = 0.0
         for j in range(tangent.shape[1]):
             value += tangent[d, j] * rates[j]
         velocity[d] = value
-        squared += value * value
-    return math.sqrt(squared)
 
 
 @compiled
@@ -79,12 +85,13 @@ def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, t
     ``poses`` belong to ``qpos``. The best configuration so far goes to ``kept``, its largest residual to ``best``; once
     it is closed, also its tangent (velocities per unit actuated velocity), the rank of the passive Jacobian, an
     estimate of its condition and the freedom that it determines worst. ``limits``: residual of a closed loop, residual
-    at which rounding is reached, residual from which Newton does not come back.
+    at which rounding is reached, residual from which Newton does not come back, and whether the loops agree only to
+    some digits: then the residual has a floor of its own, every step counts, and the last one is kept.
     """
     cdof, com, site_xpos, site_xquat, anchors = poses
     passive, actuated = split
-    closed, floor, astray = limits
-    m, nv, p, na = closures[1][-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
+    closed, floor, astray, settles = limits
+    m, nv, p, na = closures.block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
     # columns side by side in memory: the factor works along them
     a, beta, perm, x = np.empty((p, m)).T, np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
@@ -99,8 +106,8 @@ def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, t
             worst = max(worst, abs(res[i]))
             if math.isnan(res[i]):
                 worst = math.inf
-        better = worst < best[s]
-        again = floor < worst < astray and worst <= best[s]
+        better = worst < best[s] or (settles and worst < astray)
+        again = floor < worst < astray and (worst <= best[s] or settles)
         if better:
             best[s] = worst
             for k in range(qpos.shape[1]):
@@ -142,7 +149,7 @@ def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, t
 def projection(  # type: ignore[no-untyped-def]
     closures, joints, split, bodies, poses, dynamics, mass_layout, platform, masses, gravity, base_rotation,
     base_position, qpos, qvel, tangent, qdd, applied, qacc, tau, velocity_residual, acceleration_residual, motion,
-    turning, reactions,
+    turning, reactions, slack,
 ):  # fmt: skip
     """Accelerations, actuator torques, platform motion and reaction forces of a block.
 
@@ -150,13 +157,16 @@ def projection(  # type: ignore[no-untyped-def]
     least-norm values come from the same factor as qacc and are the loop reactions. ``mass`` holds M's lower triangle.
     ``motion (3, n, 3)`` receives x, xd, xdd; ``turning``, three arrays, the platform site's rotation ``(n, 3, 3)``, its
     angular velocity and acceleration ``(n, 3)``; ``reactions (loops + joints, n, 3)`` forces; all in the base's frame.
+    ``gravity (nbody, 3)`` is what pulls each body. ``slack (n, na)``, or empty, receives what the rows' disagreement is
+    worth: the power, per actuated velocity, of least-norm multipliers along ``J W``, which is zero in loops that close.
     """
     cdof, com, site_xpos, site_xquat, anchors = poses
     cdof_dot, mass, bias, damping, body_com = dynamics
     mass_row, mass_col = mass_layout
     passive, actuated = split
     body, site = platform
-    blocks, block_rows, _polynomials, root, moving, depth = closures
+    blocks, block_rows = closures.blocks, closures.block_rows
+    root, moving, depth = closures.root, closures.moving, closures.depth
     m, nv, p, na = block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     nbody = masses.shape[0]
     jac, res, rates = np.empty((m, nv)), np.empty(m), np.empty(m)
@@ -208,6 +218,15 @@ def projection(  # type: ignore[no-untyped-def]
             for i in range(m):
                 value -= jac[i, actuated[j]] * multipliers[i]
             tau[s, j] = value
+        if slack.shape[0]:
+            for j in range(na):
+                slack[s, j] = 0.0
+            for i in range(m):
+                for j in range(na):
+                    value = 0.0
+                    for d in range(nv):
+                        value += jac[i, d] * tangent[s, d, j]
+                    slack[s, j] += abs(multipliers[i] * value)
         px, py, pz = site_xpos[s, site, 0], site_xpos[s, site, 1], site_xpos[s, site, 2]
         vx, vy, vz, ax, ay, az = point_motion(v[body], acc[body], com[s, root[body]], site_xpos[s, site])
         px, py, pz = px - base_position[0], py - base_position[1], pz - base_position[2]
@@ -260,9 +279,9 @@ def _reactions(  # type: ignore[no-untyped-def]
     parent, root, _first, _number = bodies
     for b in range(parent.shape[0]):
         _, _, _, ax, ay, az = point_motion(v[b], acc[b], com[root[b]], body_com[b])
-        carried[b, 0] = masses[b] * (ax - gravity[0])
-        carried[b, 1] = masses[b] * (ay - gravity[1])
-        carried[b, 2] = masses[b] * (az - gravity[2])
+        carried[b, 0] = masses[b] * (ax - gravity[b, 0])
+        carried[b, 1] = masses[b] * (ay - gravity[b, 1])
+        carried[b, 2] = masses[b] * (az - gravity[b, 2])
     for i in range(3):
         carried[platform, i] -= applied[i]
     loops = 0
@@ -291,5 +310,5 @@ def _reactions(  # type: ignore[no-untyped-def]
 
 @inlined
 def is_site_closure(blocks, k):  # type: ignore[no-untyped-def]
-    """Whether a block joins two sites, and so carries a force that is reported."""
-    return blocks[k, 0] != SPIN and blocks[k, 3] >= 0 and not (blocks[k, 1] == 0 and blocks[k, 2] == 0)
+    """Whether a block joins two places of bodies, and so carries a force that is reported."""
+    return blocks[k, 0] in (CONNECT, WELD)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,71 +20,22 @@ from workbench.errors import ModelError, MotionError, ParameterError, did_you_me
 from workbench.mjcf.compile import custom_text
 from workbench.mjcf.setup import Setup
 from workbench.reference.along import refuse_jumps
+from workbench.reference.body_forces import acts_on_bodies, felt_gravity
 from workbench.reference.closure import LoopCloser
 from workbench.reference.continuation import Assembly
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
-from workbench.reference.freedoms import check_freedoms
+from workbench.reference.freedoms import check_freedoms, refuse_locked
 from workbench.reference.kernels import projection, velocities
 from workbench.reference.platform_closure import PlatformCloser
 from workbench.reference.platform_side import PlatformSide
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
-from workbench.reference.structure import Structure, read_structure
+from workbench.reference.result import Mobility, ReferenceResult
+from workbench.reference.structure import Structure, structure_of
+from workbench.reference.tolerance import few_digits_note, rank_of
 from workbench.robots.load import LoadedModel, load_model
 
 MASS_MODELS = ("distributed", "lumped")
-
-INCONSISTENT = 1e-9
-"""A velocity residual above this fraction of the fastest constraint velocity means that the actuated motion cannot be
-followed: the pose is singular or the mechanism is actuated redundantly and inconsistently."""
-
-
-@dataclass(frozen=True)
-class ReferenceResult:
-    """Inverse dynamics of n samples; arrays float64, SI, platform quantities in the paper's (base body's) frame."""
-
-    tau: FloatArray
-    """``(n, na)`` actuator forces (N) and torques (N m); of least norm where there are more actuators than freedoms"""
-    x: FloatArray
-    """``(n, 3)`` platform position, m"""
-    xd: FloatArray
-    xdd: FloatArray
-    rotation: FloatArray
-    """``(n, 3, 3)`` of the platform site: vector in the base's frame = rotation @ vector in the site's frame"""
-    omega: FloatArray
-    """``(n, 3)`` angular velocity of the platform, rad/s"""
-    alpha: FloatArray
-    """``(n, 3)`` angular acceleration of the platform, rad/s^2"""
-    reactions: dict[str, FloatArray]
-    """force ``(n, 3)`` in N, base frame, that the parent exerts on the child body at each joint, and that the second
-    site's body exerts on the first's at each loop closure; none where there are more actuators than freedoms"""
-    closure_residual: FloatArray
-    """``(n,)`` largest open loop coordinate, m (rad for turns)"""
-    velocity_residual: FloatArray
-    acceleration_residual: FloatArray
-    rank: np.ndarray
-    """``(n,)`` rank of the loop constraints on the passive freedoms"""
-    condition: FloatArray
-    """``(n,)`` estimate of the condition number of the passive loop Jacobian, from the pivots of its QR factor"""
-    energy: FloatArray
-    """``(n, 2)`` potential and kinetic energy, J"""
-    qpos: FloatArray
-    qvel: FloatArray
-    qacc: FloatArray
-
-
-@dataclass(frozen=True)
-class Mobility:
-    """Freedoms counted from the constraint Jacobian at the home pose."""
-
-    mobility: int
-    """freedoms left for the actuators: joint freedoms less rank less idle freedoms"""
-    joint_freedoms: int
-    constraint_rows: int
-    rank: int
-    redundant_rows: int
-    idle_freedoms: int
-    """spins of rods between two spherical joints about their own axes"""
 
 
 class MujocoReference(PlatformSide):
@@ -123,10 +73,10 @@ class MujocoReference(PlatformSide):
     ) -> None:
         loaded = loaded or load_model(path, parameters, setup)
         self.file = loaded.file
-        self._text = loaded.text
+        self.loaded = loaded
         self._threads = threads
-        self._structure = read_structure(loaded.model, loaded.file)
-        self._engines = {"distributed": Engine(loaded.model, threads)}
+        self._structure = structure_of(loaded)
+        self._engines = {"distributed": Engine(loaded.model, threads, self._structure.frames)}
         self._mass_layout = mass_layout(loaded.model)
         self._closer = LoopCloser(self._engines["distributed"], self._structure)
         tables = self._closer.tables
@@ -171,10 +121,9 @@ class MujocoReference(PlatformSide):
         """All velocities per actuated one, ``(n, nv, na)``; samples closed as `inverse_dynamics` does."""
         return self._assemble(q, ordered, near).tangent
 
-    @property
-    def text(self) -> str:
-        """The MJCF with the overrides written into it."""
-        return self._text
+    def spec(self) -> mujoco.MjSpec:
+        """A fresh specification of the model, to be changed and compiled."""
+        return self.loaded.spec()
 
     @property
     def structure(self) -> Structure:
@@ -198,12 +147,30 @@ class MujocoReference(PlatformSide):
         """
         return self._engine(mass_model).model
 
+    def with_model(self, model: mujoco.MjModel) -> MujocoReference:
+        """The same mechanism with other masses: *model* differs from the compiled one in nothing else."""
+        other = copy.copy(self)
+        other._engines = {"distributed": Engine(model, self._threads, self._structure.frames)}
+        if self._leader:
+            other._leader = self._leader[0].with_model(model), self._leader[1]
+        return other
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the results should know of the model, one line each."""
+        found = self._structure.notes
+        if self._closer.tolerance.few_digits:
+            found += (few_digits_note(self._closer.tolerance, float(self._closer.at_home.residual[0])),)
+        if self._structure.friction.passive.any():
+            found += ("dry friction of a passive joint that rests counts as zero, the middle of what it may be",)
+        return found
+
     def mobility(self) -> Mobility:
         """Count freedoms and redundant rows by rank at the home pose."""
         structure = self._structure
         jacobian = self._home_jacobian()
         loops = jacobian[: structure.loop_rows]
-        rank = int(np.linalg.matrix_rank(loops, tol=1e-9)) if len(loops) else 0
+        rank = rank_of(loops, self._closer.tolerance)
         freedoms = jacobian.shape[1]
         idle = len(structure.idle)
         return Mobility(freedoms - rank - idle, freedoms, structure.loop_rows, rank, structure.loop_rows - rank, idle)
@@ -270,15 +237,23 @@ class MujocoReference(PlatformSide):
         velocities(assembly.tangent, qd, qvel)
         site = structure.platform_site
         platform = int(model.site_bodyid[site]), site
-        masses, gravity = np.array(model.body_mass), np.array(model.opt.gravity)
+        masses, gravity = np.array(model.body_mass), felt_gravity(model)
+        few_digits = self._closer.tolerance.few_digits
+        slack = np.zeros((n if few_digits else 0, len(structure.actuated)))
+        friction = structure.friction
 
         def block(evaluator: Evaluator, rows: slice) -> None:
             poses, dynamics = evaluator.move(qpos[rows], qvel[rows])
+            if friction.inside:
+                passive = dynamics.passive[: rows.stop - rows.start] + friction.force(qvel[rows])
+                passive.flags.writeable = False
+                dynamics = dataclasses.replace(dynamics, passive=passive)
             projection(
                 *self._tables, poses.tables, dynamics.tables, self._mass_layout, platform, masses, gravity,
                 self._base_rotation, self._base_position, qpos[rows], qvel[rows], assembly.tangent[rows], qdd[rows],
                 force[rows], qacc[rows], tau[rows], velocity_residual[rows], acceleration_residual[rows],
                 motion[:, rows], (turning[0][rows], turning[1][rows], turning[2][rows]), reactions[:, rows],
+                slack[rows],
             )  # fmt: skip
             energy[rows] = dynamics.energy[: rows.stop - rows.start]
 
@@ -287,13 +262,15 @@ class MujocoReference(PlatformSide):
         if times is not None:
             refuse_jumps(times, structure, self._closer.joints, qpos, qvel, qacc)
         # in MuJoCo dry friction is a constraint, so neither bias nor passive forces hold it
-        tau += model.dof_frictionloss[structure.actuated] * direction(qd)
+        tau += friction.actuated * direction(qd)
+        known = {} if acts_on_bodies(model) else named(self._reaction_rows, reactions)
         return ReferenceResult(
             tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], rotation=turning[0], omega=turning[1],
-            alpha=turning[2], reactions=named(self._reaction_rows, reactions),
+            alpha=turning[2], reactions=known,
             closure_residual=assembly.residual.copy(), velocity_residual=velocity_residual,
             acceleration_residual=acceleration_residual, rank=assembly.rank.copy(),
             condition=assembly.condition.copy(), energy=energy, qpos=qpos.copy(), qvel=qvel, qacc=qacc,
+            slack=slack if few_digits else np.zeros_like(tau),
         )  # fmt: skip
 
     def _no_samples(self, mass_model: str) -> ReferenceResult:
@@ -318,7 +295,8 @@ class MujocoReference(PlatformSide):
                     " bars that lose their rotational inertia",
                     file=self.file,
                 )
-            known = [self._engines["distributed"].model.body(i).name for i in range(1, self._nbody)]
+            whole = self._engines["distributed"].model
+            known = [whole.body(i).name for i in range(1, whole.nbody)]
             for name in names.split():
                 if name not in known:
                     raise ModelError(
@@ -326,13 +304,11 @@ class MujocoReference(PlatformSide):
                         file=self.file,
                     )
             self._engines[mass_model] = Engine(
-                without_bar_inertia(self._text, tuple(names.split()), self.file), self._threads
+                without_bar_inertia(self.spec(), tuple(names.split()), self.file),
+                self._threads,
+                self._structure.frames,
             )
         return self._engines[mass_model]
-
-    @property
-    def _nbody(self) -> int:
-        return int(self._engines["distributed"].model.nbody)
 
     def _assemble(self, q: FloatArray, ordered: bool = False, near: ArrayLike | None = None) -> Assembly:
         if near is not None:
@@ -356,15 +332,16 @@ class MujocoReference(PlatformSide):
     def _check_freedoms(self) -> None:
         """Every passive freedom must follow from the actuated ones; there may be more actuators than needed."""
         structure, home = self._structure, self._home_jacobian()
-        check_freedoms(structure, home, self._closer.jacobian_near_home)
+        tolerance = self._closer.tolerance
+        check_freedoms(structure, home, self._closer.jacobian_near_home, tolerance.relative)
         if not self.mobility().mobility:
-            raise ModelError(
-                f"{self.file}: the loops leave no freedom, so that {', '.join(structure.joint_names)} cannot move;"
-                " take an equality out, or add a joint",
-                file=self.file,
-            )
-        if excess_actuators(home, structure.passive, structure.actuated):
-            columns, tables = leading(structure, home)
+            refuse_locked(structure, home, tolerance)
+        if tolerance.few_digits:
+            excess = len(structure.actuated) - self.mobility().mobility
+        else:
+            excess = excess_actuators(home, structure.passive, structure.actuated)
+        if excess > 0:
+            columns, tables = leading(structure, home, rank_of(home, tolerance))
             self._leader = self._led_by(dataclasses.replace(tables, home_qpos=self._closer.home)), columns
 
     def _led_by(self, structure: Structure) -> MujocoReference:
@@ -381,7 +358,7 @@ class MujocoReference(PlatformSide):
     ) -> None:
         structure = self._structure
         speed = np.maximum(np.abs(qd).max(axis=1), 1.0)
-        bad = (rank < len(structure.passive)) | ~(residual <= INCONSISTENT * speed)
+        bad = (rank < len(structure.passive)) | ~(residual <= self._closer.tolerance.velocity * speed)
         if bad.any():
             sample = int(np.argmax(bad))
             joint = structure.dof_names[int(weakest[sample])]

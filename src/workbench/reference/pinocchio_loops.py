@@ -13,8 +13,9 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
+from workbench.reference.kinds import CONNECT, JOINT, SPIN, WELD
 from workbench.reference.pinocchio_reader import Reading
-from workbench.reference.structure import CONNECT, JOINT, SPIN, WELD, Structure
+from workbench.reference.structure import Structure
 
 CLOSED = 1e-13
 """Largest residual of a closed loop, metres (for turns: radians)."""
@@ -95,7 +96,7 @@ class PinocchioLoops:
                 rows.append(row)
                 residuals.append(open_by)
             elif kind == SPIN:
-                rows.append(self._rod(one, two)[None] @ self.frame_jacobian(one)[3:])
+                rows.append(self._rod(one, two)[None] @ self._turning(int(block[1])))
                 residuals.append(np.zeros(1))
         if not rows:
             return Linear(np.zeros(0), np.zeros((0, model.nv)))
@@ -108,11 +109,30 @@ class PinocchioLoops:
         jacobian: FloatArray = self.pin.getFrameJacobian(self.model, self.data, frame, world_axes)
         return jacobian.reshape(6, -1)  # with one freedom Pinocchio returns a vector
 
-    def _rod(self, site: int, joint: int) -> FloatArray:
-        """The vector from a rod's ball joint to its far end; as long as the rod, so that rows are metres a second."""
-        far, near = self.data.oMf[self._reading.sites[site]], self.data.oMi[self._reading.joints[joint]]
-        rod: FloatArray = far.translation - near.translation
+    def _rod(self, far: int, near: int) -> FloatArray:
+        """The vector between a rod's ends; as long as the rod, so that rows are metres a second."""
+        rod: FloatArray = self._end(far) - self._end(near)
         return rod
+
+    def _end(self, point: int) -> FloatArray:
+        """A site or frame, or the anchor of joint ``-1 - point``."""
+        if point < 0:
+            return np.array(self.data.oMi[self._reading.joints[-1 - point]].translation)
+        return np.array(self.data.oMf[self._reading.sites[point]].translation)
+
+    def _turning(self, body: int) -> FloatArray:
+        """Angular Jacobian ``(3, nv)`` of a body, world axes."""
+        world_axes = self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        frame = self._reading.bodies[body]
+        jacobian: FloatArray = self.pin.getFrameJacobian(self.model, self.data, frame, world_axes).reshape(6, -1)[3:]
+        return jacobian
+
+    def _turn_rate(self, body: int) -> FloatArray:
+        """Angular acceleration ``(3,)`` of a body, world axes; needs forward kinematics."""
+        world_axes = self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        frame = self._reading.bodies[body]
+        rate: FloatArray = self.pin.getFrameAcceleration(self.model, self.data, frame, world_axes).angular
+        return rate
 
     def _joint_row(self, q: FloatArray, one: int, two: int, c: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint equality; the structure's polynomial is already one of the coordinates themselves."""
@@ -148,7 +168,7 @@ class PinocchioLoops:
                 out.append(np.array([-bend]))
             elif kind == SPIN:
                 # omega . axis = 0 at all times and the axis turns with the rod, so its own rate drops out
-                out.append(np.array([self._rod(one, two) @ self.acceleration(one)[3:]]))
+                out.append(np.array([self._rod(one, two) @ self._turn_rate(int(block[1]))]))
         return np.concatenate(out) if out else np.zeros(0)
 
     def acceleration(self, site: int) -> FloatArray:
@@ -164,8 +184,8 @@ class PinocchioLoops:
         x, _, rank, _ = np.linalg.lstsq(jacobian[:, self.passive], right, rcond=RANK)
         return np.asarray(x, dtype=np.float64), int(rank)
 
-    def close(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Close the loops for actuated coordinates ``(n, na)``, in any order of samples.
+    def close(self, q: FloatArray, ordered: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Close the loops for actuated coordinates ``(n, na)``: in any order of samples, or as one motion, in order.
 
         Returns
         -------
@@ -187,7 +207,10 @@ class PinocchioLoops:
             start = pool[nearest]
             if sample and np.sum(((q[sample - 1] - aim) / scale) ** 2) < np.sum(((known[nearest] - aim) / scale) ** 2):
                 start = configurations[sample - 1]
-            found = self._reach(start, aim) or self._reach(self.home, aim)
+            if ordered and sample:
+                found = self._reach(configurations[sample - 1], aim)
+            else:
+                found = self._reach(start, aim) or self._reach(self.home, aim)
             if found is None:
                 self._refuse(sample, aim)
             else:

@@ -26,6 +26,9 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import MissingExtraError, ModelError
 from workbench.mjcf.text import scan
+from workbench.reference.engine import NONE
+from workbench.reference.frames import Frames
+from workbench.reference.uncovered import switched_off
 
 INSTALL = 'pip install "parallel-robot-workbench[pinocchio]"'
 OLDEST = (4, 1)
@@ -81,7 +84,9 @@ def _release(version: str) -> tuple[int, ...]:
     return tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
 
 
-def read(pin: ModuleType, text: str, compiled: mujoco.MjModel, sites: set[int], file: str) -> Reading:
+def read(
+    pin: ModuleType, text: str, compiled: mujoco.MjModel, sites: set[int], file: str, frames: Frames = NONE
+) -> Reading:
     """Read *text*; see the head of this module.
 
     Parameters
@@ -92,6 +97,8 @@ def read(pin: ModuleType, text: str, compiled: mujoco.MjModel, sites: set[int], 
         The MJCF, what MuJoCo compiled of it, and its name.
     sites
         MuJoCo's numbers of the sites that are needed.
+    frames
+        Closures by bodies, which are numbered after the sites.
 
     Raises
     ------
@@ -105,12 +112,14 @@ def read(pin: ModuleType, text: str, compiled: mujoco.MjModel, sites: set[int], 
     try:
         reading, difference = _read_as_written(pin, text, compiled, sites, file)
         difference = difference or _difference(pin, reading, normal, compiled)
-    except (RuntimeError, ValueError) as error:
+    except (RuntimeError, ValueError, IndexError, KeyError, TypeError) as error:
+        # whatever its reader stumbles over, the normal form does not hold it
         reading, difference = normal, _last_line(error)
     if difference:
         reading = Reading(normal.model, normal.joints, normal.sites, normal.bodies, difference)
     model = reading.model
-    model.gravity.linear = np.array(compiled.opt.gravity)
+    _add_frames(pin, reading, frames, compiled.nsite)
+    model.gravity.linear = np.zeros(3) if switched_off(compiled, "gravity") else np.array(compiled.opt.gravity)
     damping, friction = np.zeros(model.nv), np.zeros(model.nv)
     for joint, place in enumerate(reading.joints):
         first, width = model.idx_vs[place], model.nvs[place]
@@ -118,6 +127,16 @@ def read(pin: ModuleType, text: str, compiled: mujoco.MjModel, sites: set[int], 
         friction[first : first + width] = compiled.dof_frictionloss[compiled.jnt_dofadr[joint]]
     model.damping, model.friction = damping, friction
     return reading
+
+
+def _add_frames(pin: ModuleType, reading: Reading, frames: Frames, after: int) -> None:
+    model = reading.model
+    for k in range(len(frames)):
+        body = reading.bodies[int(frames.bodies[k])]
+        parent = model.frames[body]
+        placement = parent.placement * pin.SE3(_rotation(frames.quaternions[k]), frames.positions[k])
+        frame = pin.Frame(f"workbench_frame{k}", parent.parentJoint, body, placement, pin.FrameType.OP_FRAME)
+        reading.sites[after + k] = int(model.addFrame(frame))
 
 
 def without_inertia(pin: ModuleType, reading: Reading, compiled: mujoco.MjModel, bodies: tuple[str, ...]) -> Any:

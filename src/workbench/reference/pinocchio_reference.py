@@ -17,9 +17,11 @@ from workbench.dry_friction import direction
 from workbench.errors import ModelError, MotionError, ParameterError, did_you_mean
 from workbench.mjcf.compile import custom_text
 from workbench.mjcf.setup import Setup
+from workbench.reference.kinds import CONNECT, SPIN, WELD
+from workbench.reference.pinocchio_limits import refuse_uncounted
 from workbench.reference.pinocchio_loops import PinocchioLoops
 from workbench.reference.pinocchio_reader import import_pinocchio, read, without_inertia
-from workbench.reference.structure import CONNECT, SPIN, WELD, read_structure
+from workbench.reference.structure import structure_of
 from workbench.robots.load import LoadedModel, load_model
 
 MASS_MODELS = ("distributed", "lumped")
@@ -87,11 +89,14 @@ class PinocchioReference:
         loaded = loaded or load_model(path, parameters, setup)
         self.file = loaded.file
         self._compiled = loaded.model
-        structure = self._structure = read_structure(loaded.model, loaded.file)
+        structure = self._structure = structure_of(loaded)
         sites = {structure.platform_site}
+        refuse_uncounted(loaded.model, structure)
         for kind, _, _, one, two in structure.blocks.tolist():
-            sites |= {one, two} if kind in (CONNECT, WELD) else {one} if kind == SPIN else set()
-        self._reading = read(self._pin, loaded.text, loaded.model, sites, loaded.file)
+            sites |= {
+                point for point in (one, two) if kind in (CONNECT, WELD, SPIN) and 0 <= point < loaded.model.nsite
+            }
+        self._reading = read(self._pin, _flat(loaded), loaded.model, sites, loaded.file, structure.frames)
         self._loops = PinocchioLoops(self._pin, self._reading, structure, loaded.model)
         self._models: dict[str, Any] = {"distributed": self._reading.model}
 
@@ -112,6 +117,7 @@ class PinocchioReference:
         qdd: ArrayLike,
         mass_model: str = "distributed",
         external_force: ArrayLike | None = None,
+        ordered: bool = False,
     ) -> PinocchioResult:
         """Actuator forces that produce a motion.
 
@@ -124,6 +130,8 @@ class PinocchioReference:
             ``"distributed"``, the model as it is, or ``"lumped"``, bars without rotational inertia.
         external_force
             Newtons, base (paper) frame, acting on the platform site: ``(3,)`` or ``(n, 3)``.
+        ordered
+            The samples are one motion, in the order of time: each is closed from its predecessor.
 
         Raises
         ------
@@ -141,7 +149,7 @@ class PinocchioReference:
         model = self._model(mass_model)
         data = model.createData()
         damping, friction = np.array(model.damping), np.array(model.friction)
-        configurations, closure = loops.close(q)
+        configurations, closure = loops.close(q, ordered)
         base = self._base()
         tau, motion = np.zeros((n, na)), np.zeros((3, n, 3))
         residuals, ranks = np.zeros((2, n)), np.zeros(n, dtype=np.int64)
@@ -212,3 +220,8 @@ class PinocchioReference:
             sample=sample,
             value=q.tolist(),
         )
+
+
+def _flat(loaded: LoadedModel) -> str:
+    """The file's text with its includes in it; Pinocchio would look for them elsewhere."""
+    return loaded.prepared.source.text if loaded.prepared else loaded.text

@@ -14,10 +14,11 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError, ParameterError
 from workbench.reference.closure import LoopCloser
-from workbench.reference.continuation import ASTRAY, CLOSED, NEWTON_STEPS, Assembly, Continuation
+from workbench.reference.continuation import ASTRAY, NEWTON_STEPS, Assembly, Continuation
 from workbench.reference.engine import Evaluator
 from workbench.reference.platform_kernels import platform_accelerations, platform_jacobian, platform_newton
 from workbench.reference.task import COORDINATES, POSITIONS, Task, task_of
+from workbench.reference.tolerance import rank_of
 
 DEPENDENT = 1e-9
 """A singular value of the task coordinates over the robot's motions below this (lengths in robot sizes) is zero."""
@@ -51,6 +52,7 @@ class PlatformCloser(Continuation):
 
     def __init__(self, loops: LoopCloser, task: Task, leading: np.ndarray) -> None:
         super().__init__(loops.engine, loops.structure)
+        self.tolerance = loops.tolerance
         model, structure = self.engine.model, self.structure
         self.task = task
         self.leading = leading
@@ -151,7 +153,8 @@ class PlatformCloser(Continuation):
         found = self._nothing(count, aim.shape[1])
         qpos = evaluator.qpos
         qpos[:count] = start
-        limits = (CLOSED, 0.01 * CLOSED, ASTRAY)
+        tolerance = self.tolerance
+        limits = (tolerance.residual, tolerance.floor, ASTRAY * tolerance.size, tolerance.few_digits)
         active = np.arange(count)
         for _ in range(NEWTON_STEPS):
             poses = evaluator.place(active)
@@ -197,7 +200,7 @@ class PlatformCloser(Continuation):
     def _motions(self, loops: LoopCloser, qpos: FloatArray, rows: FloatArray) -> FloatArray:
         """Velocities *rows* ``(m, nv)`` of an orthonormal basis of the mechanism's motions at *qpos*: ``(m, k)``."""
         closures = loops.jacobian(qpos) / self._lengths
-        rank = np.linalg.matrix_rank(closures, tol=1e-9) if len(closures) else 0
+        rank = rank_of(closures, self.tolerance)
         basis = np.linalg.svd(closures)[2][rank:] if len(closures) else np.eye(len(self._lengths))
         found: FloatArray = (rows / self._lengths) @ basis.T
         return found

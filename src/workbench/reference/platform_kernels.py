@@ -27,8 +27,8 @@ def platform_newton(  # type: ignore[no-untyped-def]
     the task coordinates.
     """
     cdof, com, site_xpos, site_xquat, anchors = poses
-    closed, floor, astray = limits
-    _blocks, block_rows, _polynomials, root, moving, depth = closures
+    closed, floor, astray, settles = limits
+    block_rows, root, moving, depth = closures.block_rows, closures.root, closures.moving, closures.depth
     loops, nv, given = block_rows[-1], cdof.shape[1], aim.shape[1]
     m = loops + given
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
@@ -51,8 +51,8 @@ def platform_newton(  # type: ignore[no-untyped-def]
             worst = max(worst, abs(res[i]))
             if math.isnan(res[i]):
                 worst = math.inf
-        better = worst < best[s]
-        again = floor < worst < astray and worst <= best[s]
+        better = worst < best[s] or (settles and worst < astray)
+        again = floor < worst < astray and (worst <= best[s] or settles)
         if better:
             best[s] = worst
             for k in range(qpos.shape[1]):
@@ -94,7 +94,7 @@ def platform_accelerations(  # type: ignore[no-untyped-def]
     ``qvel`` is the tangent times ``xd``; what is open counts loops and task coordinates alike.
     """
     cdof, com, site_xpos, site_xquat, anchors = poses
-    _blocks, block_rows, _polynomials, root, moving, depth = closures
+    block_rows, root, moving, depth = closures.block_rows, closures.root, closures.moving, closures.depth
     body, site = task[0], task[1]
     loops, nv, given = block_rows[-1], cdof.shape[1], aim.shape[1]
     m, nbody = loops + given, root.shape[0]
@@ -154,7 +154,7 @@ def platform_accelerations(  # type: ignore[no-untyped-def]
 def platform_jacobian(task, base, closures, poses, aim, rows, values):  # type: ignore[no-untyped-def]
     """Fill ``rows (n, m, nv)``, the task coordinates' Jacobian, and their ``values (n, m)`` nearest to ``aim``."""
     cdof, com, site_xpos, site_xquat, _anchors = poses
-    _blocks, _block_rows, _polynomials, root, moving, depth = closures
+    root, moving, depth = closures.root, closures.moving, closures.depth
     rise, still = np.empty(aim.shape[1]), np.zeros(3)
     for s in range(aim.shape[0]):
         task_rows(

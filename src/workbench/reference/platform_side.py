@@ -22,7 +22,8 @@ from workbench.reference.redundant import CONSISTENT, refuse_inconsistent
 from workbench.reference.task import POSITIONS, task_motion, task_of
 
 if TYPE_CHECKING:
-    from workbench.reference.mujoco_reference import MujocoReference, ReferenceResult
+    from workbench.reference.mujoco_reference import MujocoReference
+    from workbench.reference.result import ReferenceResult
 
 SAME_POSE = 1e-9
 """m or rad: where the loops, closed from the actuators' side, put the platform, against where it was asked to be."""

@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch, as_batches, as_force
 from workbench.errors import ArrayError, MotionError
-from workbench.reference.mujoco_reference import MujocoReference, ReferenceResult
+from workbench.reference.energy_jump import energy_jump, losses
+from workbench.reference.mujoco_reference import MujocoReference
+from workbench.reference.power_terms import Terms, terms_of
 
 MOST_SAMPLES = 150
 """Samples looked at; a longer motion is thinned out evenly, and the samples of greatest power are always kept."""
@@ -26,6 +28,12 @@ PEAKS = 30
 FIRST_STEP = 0.05
 """First difference step as a fraction of the motion's time scale. Truncation falls with a high power of the step and
 rounding grows with its inverse; over the bundled campaigns they meet at 0.02 to 0.05, near a singular pose lower."""
+
+PLAIN = 5e-12
+"""Of the peak power: what the balance of a robot with few bodies reaches, and a large one's no longer does."""
+
+ROUNDING = 2.0
+"""Roundings in one term of energy or power: of the coordinate or velocity in it, and of the term."""
 
 HALVINGS = 6
 """How often a sample's step is halved at most, in search of the step where truncation meets rounding."""
@@ -39,9 +47,6 @@ without acceleration has a time scale too."""
 
 SHRINKINGS = 6
 """How often the first step is halved where a displaced sample leaves the workspace."""
-
-ROUNDING = 1e-13
-"""Of the energy: what its rounding may pretend between two samples."""
 
 WEIGHTS = (6 / 7, -15 / 56, 5 / 63, -1 / 56, 1 / 385, -1 / 5544)
 """Twelfth-order central difference: the weights of f(+k h) - f(-k h), k = 1 to 6."""
@@ -62,7 +67,8 @@ class PowerBalance:
     storage: FloatArray
     """dE/dt, kinetic and potential"""
     dissipation: FloatArray
-    """damping qvel^2 + frictionloss |qvel|, summed over all freedoms, passive and ball ones too; never negative"""
+    """damping qvel^2 + frictionloss |qvel|, summed over all freedoms, passive and ball ones too, and what further
+    passive forces take that no energy of MuJoCo's holds: fluid, polynomial damping, gravity compensation"""
     peak_power: float
     """max |tau . qd| over all n samples, the normaliser, W"""
     relative: float
@@ -72,6 +78,18 @@ class PowerBalance:
     """index into the n samples of the largest |residual|"""
     differentiation: float
     """difference of dE/dt between two step sizes, over peak_power: below it, `relative` says nothing"""
+    rounding: float
+    """what rounding alone may leave of the balance, over peak_power: machine precision times the terms that cancel in
+    it. In a machine of many heavy bodies they are far larger than the power that the actuators put in"""
+
+    @property
+    def uncertainty(self) -> float:
+        """What the balance holds against the torques, over peak_power.
+
+        It is `relative`; where rounding of the balance's own terms explains that, no more than `PLAIN` is put down to
+        the torques.
+        """
+        return float(np.maximum(np.minimum(self.relative, PLAIN), self.relative - self.rounding))
 
 
 def power_balance(
@@ -118,11 +136,11 @@ def power_balance(
     power = np.sum(torques * qd, axis=1)
     peak = float(np.abs(power).max())
     kept = _selection(power)
-    jump = 0.0 if along is None else _energy_jump(reference, result, power, force, mass_model, np.asarray(along))
-    storage, doubt = _energy_rate(reference, result.qpos[kept], q[kept], qd[kept], qdd[kept], mass_model)
-    model = reference.compiled(mass_model)
+    jump = 0.0 if along is None else energy_jump(reference, result, power, force, mass_model, np.asarray(along))
+    storage, doubt, steps = _energy_rate(reference, result.qpos[kept], q[kept], qd[kept], qdd[kept], mass_model)
     qvel = result.qvel[kept]
-    dissipation = qvel**2 @ np.asarray(model.dof_damping) + np.abs(qvel) @ np.asarray(model.dof_frictionloss)
+    terms = terms_of(reference.compiled(mass_model), result.qpos[kept], qvel, result.qacc[kept])
+    dissipation = losses(reference, mass_model, qvel, terms)
     external = np.sum(force[kept] * result.xd[kept], axis=1)
     residual = power[kept] + external - storage - dissipation
     size = np.abs(residual)
@@ -137,37 +155,15 @@ def power_balance(
         relative=_ratio(max(float(size.max()), jump), peak),
         worst_sample=int(kept[int(np.argmax(np.where(np.isnan(size), np.inf, size)))]),
         differentiation=_ratio(float(doubt.max()), peak),
+        rounding=_ratio(float(_rounding(terms, steps).max()), peak),
     )
 
 
-def _energy_jump(
-    reference: MujocoReference,
-    result: ReferenceResult,
-    power: FloatArray,
-    force: FloatArray,
-    mass_model: str,
-    t: FloatArray,
-) -> float:
-    """Largest change of energy between neighbours that no power between them accounts for, in watts over the step.
-
-    Whatever rule integrates the power over a step, its error is below the step times how much the power changes around
-    it; a motion that goes on has nothing beyond that, one that jumps to another assembly has its gap in height.
-    """
-    if len(t) < 2:
-        return 0.0
-    model = reference.compiled(mass_model)
-    lost = result.qvel**2 @ np.asarray(model.dof_damping) + np.abs(result.qvel) @ np.asarray(model.dof_frictionloss)
-    put_in = power + np.sum(force * result.xd, axis=1) - lost
-    change = np.diff(result.energy.sum(axis=1)) / np.diff(t)
-    around = np.stack([np.roll(put_in, shift) for shift in (1, 0, -1, -2)])
-    around[0, 0], around[2:, -1], around[3, -2:] = put_in[0], put_in[-1], put_in[-1]
-    low, high = around.min(axis=0)[:-1], around.max(axis=0)[:-1]
-    # as much again to both sides: between the samples the power may peak
-    room = high - low
-    unexplained = np.maximum(change - (high + room), (low - room) - change)
-    if np.isnan(unexplained).any():
-        return float("nan")
-    return max(0.0, float(unexplained.max()) - ROUNDING * float(np.abs(result.energy).max() / np.diff(t).min()))
+def _rounding(terms: Terms, steps: FloatArray) -> FloatArray:
+    """What rounding leaves of each sample's balance, W: of the energies' difference quotient, and of the forces."""
+    quotient = terms.energy * 2.0 * float(np.sum(np.abs(WEIGHTS))) / steps
+    found: FloatArray = ROUNDING * np.finfo(np.float64).eps * (quotient + terms.power)
+    return found
 
 
 def _same_shape(tau: ArrayLike, q: FloatArray) -> FloatArray:
@@ -203,11 +199,11 @@ def time_scale(qd: FloatArray, qdd: FloatArray) -> float:
 
 def _energy_rate(
     reference: MujocoReference, qpos: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str
-) -> tuple[FloatArray, FloatArray]:
-    """Return dE/dt ``(m,)`` and how far it is in doubt, both in watts."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return dE/dt ``(m,)``, how far it is in doubt, both in watts, and the step that it was found with, s."""
     scale = time_scale(qd, qdd)
     if not np.isfinite(scale):
-        return np.zeros(len(q)), np.zeros(len(q))
+        return np.zeros(len(q)), np.zeros(len(q)), np.full(len(q), np.inf)
     step = FIRST_STEP * scale
     for attempt in range(SHRINKINGS + 1):
         try:
@@ -219,7 +215,7 @@ def _energy_rate(
                 raise
             step *= 0.5
     best, doubt = rate.copy(), np.full(len(q), np.inf)
-    estimate = rate.copy()
+    estimate, steps = rate.copy(), np.full(len(q), step)
     active = np.arange(len(q))
     for _ in range(HALVINGS):
         step *= 0.5
@@ -229,12 +225,12 @@ def _energy_rate(
         gap = np.abs(refined - estimate[active])
         rate[active], estimate[active] = finer, refined
         better = gap < doubt[active]
-        best[active[better]], doubt[active[better]] = refined[better], gap[better]
+        best[active[better]], doubt[active[better]], steps[active[better]] = refined[better], gap[better], step
         # where the gap grows again, rounding has taken over
         active = active[better & (gap > CLOSE_ENOUGH * np.abs(rate).max())]
         if not len(active):
             break
-    return best, doubt
+    return best, doubt, steps
 
 
 def _difference(

@@ -20,7 +20,8 @@ from workbench.errors import MotionError
 from workbench.reference.structure import Structure
 
 if TYPE_CHECKING:
-    from workbench.reference.mujoco_reference import MujocoReference, ReferenceResult
+    from workbench.reference.mujoco_reference import MujocoReference
+    from workbench.reference.result import ReferenceResult
 
 RANK_TOLERANCE = 1e-10
 """A singular value below this fraction of the largest counts as zero."""
@@ -51,7 +52,7 @@ def excess_actuators(jacobian: FloatArray, passive: np.ndarray, actuated: np.nda
     return int(np.linalg.matrix_rank(self_stress(jacobian, passive, actuated)[1], tol=1e-9 * scale))
 
 
-def leading(structure: Structure, jacobian: FloatArray) -> tuple[np.ndarray, Structure]:
+def leading(structure: Structure, jacobian: FloatArray, rank: int) -> tuple[np.ndarray, Structure]:
     """Choose as many actuators as there are freedoms, those that determine the rest best.
 
     Parameters
@@ -60,13 +61,14 @@ def leading(structure: Structure, jacobian: FloatArray) -> tuple[np.ndarray, Str
         Tables of a mechanism with excess actuators.
     jacobian
         Constraint Jacobian ``(m, nv)`` at home.
+    rank
+        Its rank.
 
     Returns
     -------
     numpy.ndarray, Structure
         Their places among the actuated joints, and the tables in which the other actuated joints are passive.
     """
-    rank = np.linalg.matrix_rank(jacobian, tol=1e-9 * float(np.abs(jacobian).max()))
     motions = np.linalg.svd(jacobian, full_matrices=True)[2][rank:]
     order = qr(motions[:, structure.actuated], pivoting=True, mode="r")[1]
     chosen = np.sort(order[: len(motions)])
@@ -78,6 +80,7 @@ def leading(structure: Structure, jacobian: FloatArray) -> tuple[np.ndarray, Str
         structure,
         actuated=actuated,
         actuated_qpos=structure.actuated_qpos[chosen],
+        friction=dataclasses.replace(structure.friction, actuated=structure.friction.actuated[chosen]),
         passive=passive,
         joint_names=tuple(structure.joint_names[i] for i in chosen),
         columns=columns,
@@ -122,7 +125,7 @@ def shared(
     """Inverse dynamics of excess actuators: the leading ones give motion and power, all of them share the load.
 
     With A = dqd/dqd_lead, torques that do the same work fulfil ``A^T tau = tau_lead``; those of least norm are
-    ``pinv(A^T) tau_lead``.
+    ``pinv(A^T) tau_lead``. Dry friction of an excess actuator's joint is its own business, as that of a leading one is.
     Reactions depend on how the load is shared; they are left out.
 
     Raises
@@ -138,8 +141,9 @@ def shared(
     refuse_inconsistent("qd", qd, found.qvel[:, structure.actuated], names, CONSISTENT * speed)
     rise = speed**2 + np.abs(qdd).max(axis=1, keepdims=True)
     refuse_inconsistent("qdd", qdd, found.qacc[:, structure.actuated], names, CONSISTENT * rise)
-    dry = leader.compiled(mass_model).dof_frictionloss[structure.actuated] * direction(qd)
+    dry = structure.friction.actuated * direction(qd)
     per_lead = leader.tangent(q[:, columns], along is not None, near)[:, structure.actuated]
     work = found.tau - dry[:, columns]
     tau = np.matmul(np.linalg.pinv(per_lead.transpose(0, 2, 1)), work[:, :, None])[:, :, 0] + dry
-    return dataclasses.replace(found, tau=tau, reactions={})
+    slack = np.matmul(np.abs(np.linalg.pinv(per_lead.transpose(0, 2, 1))), found.slack[:, :, None])[:, :, 0]
+    return dataclasses.replace(found, tau=tau, reactions={}, slack=slack)

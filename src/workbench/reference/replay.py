@@ -60,6 +60,9 @@ LOST = 10.0
 LOOP_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """Near-rigid loop closures, with solref "2h 1" for step h; stiffer direct values diverge."""
 
+SILENT, PULLING = 30, 29
+"""Groups of actuators: the file's own, which are switched off, and the one that stands for an external force."""
+
 REFERENCE = "reference"
 """Name of the reference's own torques among the replayed ones."""
 
@@ -179,7 +182,7 @@ def replay(
     start, stop
         Window, s; at most `LONGEST_WINDOW` of it is replayed.
     external_force
-        One constant vector ``(3,)`` in newtons, paper frame, on the platform (exact for platforms that do not turn).
+        One constant vector ``(3,)`` in newtons, paper frame, on the platform; it follows the platform's site.
 
     Returns
     -------
@@ -240,7 +243,7 @@ class _Runner:
         """
         structure = self._reference.structure
         step = window / steps
-        model = near_rigid(self._reference.text, step)
+        model = near_rigid(self._reference.spec(), step, self._pull())
         times = _times(self._start + 0.5 * step, step, steps)
         middle = self._motion_at(times)
         applied = np.zeros((len(torques) * len(factors), steps, model.nv))
@@ -256,7 +259,6 @@ class _Runner:
         batch = Batch(model, count, 1)
         batch.qpos = np.repeat(self._initial.qpos, count, axis=0)
         batch.qvel = np.repeat(self._initial.qvel, count, axis=0)
-        batch.xfrc_applied = np.repeat(self._wrench(model)[None], count, axis=0)
         with _quiet():
             record = batch.rollout(steps, applied, mujoco.mjtState.mjSTATE_QFRC_APPLIED.value, record=("qpos",))
         followed = record["qpos"][:, every - 1 :: every, :][:, :, structure.actuated_qpos]
@@ -268,17 +270,13 @@ class _Runner:
     def _own(self, times: FloatArray, middle: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
         return self._reference.inverse_dynamics(*middle, "distributed", self._force, along=times).tau
 
-    def _wrench(self, model: mujoco.MjModel) -> FloatArray:
-        """Force and its moment about the platform's mass centre, ``(nbody, 6)``, world frame, at the initial pose."""
-        site = self._reference.structure.platform_site
-        body = int(model.site_bodyid[site])
-        data = mujoco.MjData(model)
-        data.qpos[:] = self._initial.qpos[0]
-        mujoco.mj_kinematics(model, data)
-        wrench = np.zeros((model.nbody, 6))
-        wrench[body, :3] = self._reference.base_rotation @ self._force
-        wrench[body, 3:] = np.cross(data.site_xpos[site] - data.xipos[body], wrench[body, :3])
-        return wrench
+    def _pull(self) -> tuple[str, FloatArray] | None:
+        """The platform's site and the force on it ``(3,)``, world frame; None where there is none."""
+        if not self._force.any():
+            return None
+        reference = self._reference
+        name = reference.compiled().site(reference.structure.platform_site).name
+        return name, reference.base_rotation @ self._force
 
 
 @contextmanager
@@ -298,9 +296,18 @@ def _times(first: float, step: float, count: int) -> FloatArray:
 
 
 @engine_warnings()
-def near_rigid(text: str, step: float) -> mujoco.MjModel:
-    """Compile an MJCF for forward simulation at a step in seconds, loops and dry friction as stiff as it allows."""
-    spec = mujoco.MjSpec.from_string(text)
+def near_rigid(spec: mujoco.MjSpec, step: float, pull: tuple[str, FloatArray] | None = None) -> mujoco.MjModel:
+    """Compile an MJCF for forward simulation.
+
+    Parameters
+    ----------
+    spec
+        A specification of its own, `MujocoReference.spec`.
+    step
+        Time step, s; loops and dry friction are as stiff as it allows.
+    pull
+        A site and a constant force on it ``(3,)``, N, world frame, which follows the site in every step.
+    """
     option = spec.option
     option.timestep = step
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -310,15 +317,39 @@ def near_rigid(text: str, step: float) -> mujoco.MjModel:
     option.tolerance = 1e-12
     # torques are applied to the joints themselves, whatever the actuators' gears and limits are
     flags = mujoco.mjtDisableBit
-    option.disableflags |= flags.mjDSBL_CONTACT.value | flags.mjDSBL_ACTUATION.value | flags.mjDSBL_AUTORESET.value
+    option.disableflags |= flags.mjDSBL_CONTACT.value | flags.mjDSBL_AUTORESET.value
+    for actuator in spec.actuators:
+        actuator.group = SILENT
+    option.disableactuator |= 1 << SILENT
+    if pull is not None:
+        _pull_at(spec, *pull)
     for equality in spec.equalities:
         equality.solref = [2.0 * step, 1.0]
         equality.solimp = list(LOOP_SOLIMP)
     # dry friction is a constraint too; with its soft defaults joints would creep
-    for joint in spec.joints:
-        joint.solref_friction = [2.0 * step, 1.0]
-        joint.solimp_friction = list(LOOP_SOLIMP)
+    for rubbing in (*spec.joints, *spec.tendons):
+        rubbing.solref_friction = [2.0 * step, 1.0]
+        rubbing.solimp_friction = list(LOOP_SOLIMP)
     return spec.compile()
+
+
+def _pull_at(spec: mujoco.MjSpec, site: str, force: FloatArray) -> None:
+    """Add an actuator whose force on a site is constant in the world: its gear is counted in a site of the world."""
+    origin = spec.worldbody.add_site(name="workbench origin", pos=[0.0, 0.0, 0.0])
+    actuator = spec.add_actuator(
+        name="workbench pull",
+        trntype=mujoco.mjtTrn.mjTRN_SITE,
+        target=site,
+        refsite=origin.name,
+        gear=[*force.tolist(), 0.0, 0.0, 0.0],
+        group=PULLING,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+    )
+    actuator.gainprm[0] = 0.0
+    actuator.biasprm[0] = 1.0  # times gear
+    # keyframes hold as many controls as there were actuators
+    for key in list(spec.keys):
+        spec.delete(key)
 
 
 def _labels(reference: MujocoReference) -> tuple[tuple[str, str], ...]:

@@ -7,7 +7,7 @@ mass of the kinematic tree.
 from __future__ import annotations
 
 from workbench.compiled import compiled, inlined
-from workbench.reference.structure import CONNECT, JOINT, SPIN, WELD
+from workbench.reference.kinds import CONNECT, JOINT, SPIN, TENDON, WELD
 
 
 @inlined
@@ -42,10 +42,17 @@ def _relative_turn(qa, qb, out, row):  # type: ignore[no-untyped-def]
     out[row], out[row + 1], out[row + 2] = sign * x, sign * y, sign * z
 
 
+@inlined
+def _end(site_xpos, anchors, point, i):  # type: ignore[no-untyped-def]
+    """Coordinate i of a rod's end: a site or frame, or the anchor of a joint."""
+    return site_xpos[point, i] if point >= 0 else anchors[-1 - point, i]
+
+
 @compiled
 def constraint_rows(closures, joints, qpos, cdof, com, site_xpos, site_xquat, anchors, jac, res):  # type: ignore[no-untyped-def]
     """Fill the constraint Jacobian ``(m, nv)`` and residual ``(m,)`` of one sample."""
-    blocks, block_rows, polynomials, root, moving, depth = closures
+    blocks, block_rows, polynomials = closures.blocks, closures.block_rows, closures.polynomials
+    root, moving, depth, tendons = closures.root, closures.moving, closures.depth, closures.tendons
     _kinds, qpos_of, dof_of = joints
     jac[:, :] = 0.0
     res[:] = 0.0
@@ -69,13 +76,28 @@ def constraint_rows(closures, joints, qpos, cdof, com, site_xpos, site_xquat, an
             if s2 >= 0:
                 jac[row, dof_of[s2]] = -(c[1] + y * (2.0 * c[2] + y * (3.0 * c[3] + y * 4.0 * c[4])))
         elif kind == SPIN:
-            # the rod's axis runs from its ball joint to its far end; scaled by the length, so that rows are metres
+            # the rod's axis runs from its near end to its far end; scaled by the length, so that rows are metres
             for j in range(depth[b1]):
                 d = moving[b1, j]
                 s = 0.0
                 for i in range(3):
-                    s += cdof[d, i] * (site_xpos[s1, i] - anchors[s2, i])
+                    s += cdof[d, i] * (_end(site_xpos, anchors, s1, i) - _end(site_xpos, anchors, s2, i))
                 jac[row, d] = s
+        elif kind == TENDON:
+            c = polynomials[k]
+            y = 0.0
+            if s2 >= 0:
+                for j in range(tendons.shape[1]):
+                    if tendons[s2, j] != 0.0:
+                        y += tendons[s2, j] * qpos[qpos_of[j]]
+            slope = c[1] + y * (2.0 * c[2] + y * (3.0 * c[3] + y * 4.0 * c[4]))
+            res[row] = -(c[0] + y * (c[1] + y * (c[2] + y * (c[3] + y * c[4]))))
+            for j in range(tendons.shape[1]):
+                if tendons[s1, j] != 0.0:
+                    res[row] += tendons[s1, j] * qpos[qpos_of[j]]
+                    jac[row, dof_of[j]] += tendons[s1, j]
+                if s2 >= 0 and tendons[s2, j] != 0.0:
+                    jac[row, dof_of[j]] -= slope * tendons[s2, j]
 
 
 @inlined
@@ -109,7 +131,8 @@ def point_motion(v, a, com, point):  # type: ignore[no-untyped-def]
 @compiled
 def acceleration_rows(closures, joints, qpos, com, site_xpos, anchors, qvel, qacc, v, a, out):  # type: ignore[no-untyped-def]
     """Second time derivative of every constraint, ``(m,)``: J qacc + Jdot qvel, from the bodies' motion."""
-    blocks, block_rows, polynomials, root, _moving, _depth = closures
+    blocks, block_rows, polynomials = closures.blocks, closures.block_rows, closures.polynomials
+    root, tendons = closures.root, closures.tendons
     _kinds, qpos_of, dof_of = joints
     for k in range(blocks.shape[0]):
         kind, b1, b2, s1, s2 = blocks[k, 0], blocks[k, 1], blocks[k, 2], blocks[k, 3], blocks[k, 4]
@@ -133,5 +156,19 @@ def acceleration_rows(closures, joints, qpos, com, site_xpos, anchors, qvel, qac
             # omega . axis = 0 at all times; the axis turns with the body, so its own rate drops out
             s = 0.0
             for i in range(3):
-                s += a[b1, i] * (site_xpos[s1, i] - anchors[s2, i])
+                s += a[b1, i] * (_end(site_xpos, anchors, s1, i) - _end(site_xpos, anchors, s2, i))
             out[row] = s
+        elif kind == TENDON:
+            c = polynomials[k]
+            y, yd, ydd = 0.0, 0.0, 0.0
+            out[row] = 0.0
+            for j in range(tendons.shape[1]):
+                if tendons[s1, j] != 0.0:
+                    out[row] += tendons[s1, j] * qacc[dof_of[j]]
+                if s2 >= 0 and tendons[s2, j] != 0.0:
+                    y += tendons[s2, j] * qpos[qpos_of[j]]
+                    yd += tendons[s2, j] * qvel[dof_of[j]]
+                    ydd += tendons[s2, j] * qacc[dof_of[j]]
+            first = c[1] + y * (2.0 * c[2] + y * (3.0 * c[3] + y * 4.0 * c[4]))
+            second = 2.0 * c[2] + y * (6.0 * c[3] + y * 12.0 * c[4])
+            out[row] -= first * ydd + second * yd**2

@@ -3,23 +3,41 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
-from workbench.reference.structure import Structure
+from workbench.arrays import FloatArray
+from workbench.reference.kinds import BALL, FREE, SCALAR
+from workbench.reference.structure import IntArray, Structure
 
-BALL = 1
-"""Kind of a joint in the tables; hinges and slides are 0."""
+KINDS = {mujoco.mjtJoint.mjJNT_BALL: BALL, mujoco.mjtJoint.mjJNT_FREE: FREE}
+
+
+class ClosureTables(NamedTuple):
+    """What rows are made of; kernels read it by name, so that a further kind of closure may bring its own table."""
+
+    blocks: IntArray
+    """``(k, 5)``, see `Structure`"""
+    block_rows: IntArray
+    """``(k + 1,)`` first row of each block, and their number"""
+    polynomials: FloatArray
+    root: IntArray
+    """``(nbody,)`` root of the tree that holds each body"""
+    moving: IntArray
+    """``(nbody, most)`` velocities that move each body"""
+    depth: IntArray
+    """``(nbody,)`` how many they are"""
+    tendons: FloatArray
+    """``(ntendon, njnt)`` coefficients of fixed tendons"""
 
 
 @dataclass(frozen=True)
 class Tables:
     """What stays the same over all samples of a model."""
 
-    closures: tuple[Any, ...]
-    """blocks, first row of each, polynomials, root body of each body, velocities that move each body, how many"""
+    closures: ClosureTables
     joints: tuple[Any, ...]
     """kind, position address and velocity address of each joint"""
     split: tuple[Any, ...]
@@ -34,11 +52,19 @@ def tables_of(model: mujoco.MjModel, structure: Structure) -> Tables:
     moving = np.zeros((model.nbody, max(1, int(depth.max(initial=0)))), dtype=np.int64)
     for body, moves in enumerate(structure.moves):
         moving[body, : depth[body]] = np.flatnonzero(moves)
-    ball = mujoco.mjtJoint.mjJNT_BALL.value
+    kinds = [KINDS.get(mujoco.mjtJoint(kind), SCALAR) for kind in model.jnt_type]
     return Tables(
-        closures=(structure.blocks, structure.block_rows, structure.polynomials, structure.root, moving, depth),
+        closures=ClosureTables(
+            structure.blocks,
+            structure.block_rows,
+            structure.polynomials,
+            structure.root,
+            moving,
+            depth,
+            structure.tendons,
+        ),
         joints=(
-            np.where(np.asarray(model.jnt_type) == ball, BALL, 0).astype(np.int64),
+            np.array(kinds, dtype=np.int64),
             np.array(model.jnt_qposadr, dtype=np.int64),
             np.array(model.jnt_dofadr, dtype=np.int64),
         ),

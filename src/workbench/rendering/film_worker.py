@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from pathlib import Path
 
 import mujoco
@@ -25,7 +26,7 @@ SHADOWS = 1024
 
 def film(folder: Path, width: int, height: int, columns: int) -> None:
     """Draw the poses in *folder*: the first one twice as large, all of them as one sheet of frames, row by row."""
-    model = mujoco.MjModel.from_xml_path(str(folder / MODEL))
+    model = mujoco.MjModel.from_binary_path(str(folder / MODEL))
     model.vis.quality.offsamples, model.vis.quality.shadowsize = 0, SHADOWS
     poses = np.load(folder / POSES)
     large = next(rendered(model, poses[:1], 2 * FINER * width, 2 * FINER * height))
@@ -40,7 +41,14 @@ def _smaller(picture: np.ndarray) -> Image.Image:
     return Image.fromarray(picture).reduce(FINER)
 
 
+def _end_with_parent() -> None:
+    """Wait for the end of the standard input, which the run that began this process holds open, and end."""
+    sys.stdin.buffer.read()
+    os._exit(0)
+
+
 if __name__ == "__main__":
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     if hasattr(os, "nice"):
         os.nice(10)  # the run that it belongs to goes first
     film(Path(sys.argv[1]), *map(int, sys.argv[2:5]))

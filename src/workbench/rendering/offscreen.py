@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
-import tempfile
 from collections.abc import Iterator
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench import processes
 from workbench.errors import ModelError, OutputError, ParameterError, did_you_mean
 from workbench.rendering import worker
 from workbench.rendering.poses import Poses
 from workbench.rendering.system import offscreen_backend
+from workbench.scratch import scratch_directory
 
 Picture = NDArray[np.uint8]
 """``(height, width, 3)`` red, green, blue"""
@@ -52,14 +50,21 @@ def draw(poses: Poses, width: int, height: int, camera: str | None = None) -> It
         if not SIDES[0] <= value <= SIDES[1]:
             raise ParameterError(f"{name} {value} pixels; allowed: {SIDES[0]} to {SIDES[1]}", value=value)
     view = _camera(poses.model, camera)
-    environment = {**os.environ, "MUJOCO_GL": offscreen_backend()}
-    with tempfile.TemporaryDirectory(prefix="workbench_") as folder:
-        (Path(folder) / worker.MODEL).write_text(poses.text, encoding="utf-8")
-        np.save(Path(folder) / worker.POSES, poses.qpos)
-        command = [sys.executable, "-m", worker.__name__, folder, str(width), str(height), view]
+    backend = offscreen_backend()
+    with scratch_directory() as folder:
+        mujoco.mj_saveModel(poses.model, str(folder / worker.MODEL))
+        np.save(folder / worker.POSES, poses.qpos)
+        command = processes.python_module(worker.__name__, str(folder), str(width), str(height), view)
         with (
-            open(Path(folder) / "log", "w+", encoding="utf-8", errors="replace") as log,
-            subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log) as process,
+            open(folder / "log", "w+", encoding="utf-8", errors="replace") as log,
+            subprocess.Popen(
+                command,
+                env=processes.environment(MUJOCO_GL=backend),
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=log,
+            ) as process,
         ):
             assert process.stdout is not None
             try:

@@ -14,7 +14,7 @@ from workbench.campaign.spec import load_campaign
 from workbench.errors import MotionError, WorkbenchError
 from workbench.reference.closure import LoopCloser
 from workbench.reference.engine import Engine
-from workbench.reference.structure import read_structure
+from workbench.reference.structure import structure_of
 from workbench.robots.load import open_model
 
 MOST_FRAMES = 6000
@@ -25,9 +25,8 @@ MOST_FRAMES = 6000
 class Poses:
     """Poses of a model."""
 
-    text: str
-    """MJCF, parameters of the case written into it"""
     model: mujoco.MjModel
+    """parameters of the case written into it"""
     qpos: FloatArray = field(repr=False)
     """``(n, nq)``"""
     times: FloatArray = field(repr=False)
@@ -45,12 +44,13 @@ def home_pose(path: Path) -> Poses:
     """
     loaded = open_model(path)
     try:
-        qpos = LoopCloser(Engine(loaded.model), read_structure(loaded.model, loaded.file)).home
+        structure = structure_of(loaded)
+        qpos = LoopCloser(Engine(loaded.model, frames=structure.frames), structure).home
     except WorkbenchError:
         model = loaded.model
         home = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, "home")
         qpos = np.array(model.key_qpos[home] if home >= 0 else model.qpos0, dtype=np.float64)
-    return Poses(loaded.text, loaded.model, qpos[None, :], np.zeros(1), f"{loaded.file}, home pose")
+    return Poses(loaded.model, qpos[None, :], np.zeros(1), f"{loaded.file}, home pose")
 
 
 def motion_poses(
@@ -75,7 +75,7 @@ def motion_poses(
         As for a run; or times that the motion does not have, or too many frames.
     """
     spec, file = load_campaign(campaign)
-    found = resolve_cases(spec, file, path, (case or spec.case[0].name,))[0]
+    found = resolve_cases(spec, file, path, (spec.case[0].name if case is None else case,))[0]
     first, last = float(found.motion.t[0]), float(found.motion.t[-1])
     start, stop = first if start is None else start, last if stop is None else stop
     if not first <= start <= stop <= last:
@@ -92,4 +92,4 @@ def motion_poses(
     times = start + step * np.arange(int(count) + 1, dtype=np.float64)
     reference = found.robot.reference
     qpos = reference.inverse_dynamics(*course_of(found)(times), along=times).qpos
-    return Poses(reference.text, reference.compiled(), qpos, times, f"{path}, {found.name}")
+    return Poses(reference.compiled(), qpos, times, f"{path}, {found.name}")

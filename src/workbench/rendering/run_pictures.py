@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
-import sys
-import tempfile
 import threading
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 
+from workbench import processes
 from workbench.arrays import FloatArray
 from workbench.campaign import store
 from workbench.campaign.compare import CaseResult
@@ -21,6 +20,7 @@ from workbench.errors import MissingExtraError
 from workbench.rendering import film_worker
 from workbench.rendering.system import backends, needs
 from workbench.rendering.worker import MODEL, POSES
+from workbench.scratch import Scratch
 
 popen = subprocess.Popen
 """What starts the process that draws."""
@@ -38,7 +38,7 @@ class RunPictures:
     """Draws in processes of their own, watched by a thread; what goes wrong is said in the record."""
 
     def __init__(self) -> None:
-        self._folder: Path | None = None
+        self._scratch: Scratch | None = None
         self._thread: threading.Thread | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._record: dict[str, Any] = {}
@@ -51,13 +51,13 @@ class RunPictures:
             return
         try:
             needs("OpenGL", "glfw", "PIL")
-            self._folder = Path(tempfile.mkdtemp(prefix="workbench_"))
-            self._record = _write_poses(self._folder, result.model_text, result.qpos, result.series["t"])
+            self._scratch = Scratch()
+            self._record = _write_poses(self._scratch.path, result.model, result.qpos, result.series["t"])
         except (MissingExtraError, OSError) as error:
             self._note = str(error)
             return
         self._record["case"] = result.name
-        self._thread = threading.Thread(target=self._draw, args=(self._folder,), daemon=True)
+        self._thread = threading.Thread(target=self._draw, args=(self._scratch.path,), daemon=True)
         self._thread.start()
 
     def finish(self, stage: Path) -> None:
@@ -71,9 +71,9 @@ class RunPictures:
         folder = stage / store.PICTURES
         folder.mkdir(exist_ok=True)
         record: dict[str, Any] = {"format": FORMAT, "note": self._note}
-        if not self._note and self._folder is not None:
+        if not self._note and self._scratch is not None:
             for name in (film_worker.STILL, film_worker.FILM):
-                shutil.copyfile(self._folder / name, folder / name)
+                shutil.copyfile(self._scratch.path / name, folder / name)
             manifest = json.loads((stage / store.MANIFEST).read_text(encoding="utf-8"))
             record |= {"model_sha256": manifest["model"]["sha256"], **self._record}
         text = json.dumps(record, indent=1, ensure_ascii=False) + "\n"
@@ -86,25 +86,29 @@ class RunPictures:
             self._process.kill()
         if self._thread is not None:
             self._thread.join(PATIENCE_S)
-        if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        if self._scratch is not None:
+            self._scratch.close()
 
     def _draw(self, folder: Path) -> None:
         """Try one OpenGL after the other: a machine that can draw needs one process, others some that fail fast."""
         tried = backends()
-        command = [sys.executable, "-m", film_worker.__name__, str(folder), *map(str, (WIDTH, HEIGHT, COLUMNS))]
+        command = processes.python_module(film_worker.__name__, str(folder), *map(str, (WIDTH, HEIGHT, COLUMNS)))
         for backend in tried:
             if self._over:
                 return
             try:
                 self._process = popen(
                     command,
-                    env={**os.environ, "MUJOCO_GL": backend},
-                    stdin=subprocess.DEVNULL,
+                    env=processes.environment(MUJOCO_GL=backend),
+                    cwd=folder,
+                    stdin=subprocess.PIPE,  # closed by the system when this process dies: then the other ends, too
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.DEVNULL,
                 )
-                if self._process.wait() == 0 and (folder / film_worker.FILM).is_file():
+                ended = self._process.wait()
+                if self._process.stdin is not None:
+                    self._process.stdin.close()
+                if ended == 0 and (folder / film_worker.FILM).is_file():
                     return
             except OSError as error:
                 self._note = f"drawing could not be started: {error.strerror or error}"
@@ -112,9 +116,9 @@ class RunPictures:
         self._note = f"no offscreen OpenGL on this machine (tried {', '.join(tried)})"
 
 
-def _write_poses(folder: Path, text: str, qpos: FloatArray, times: FloatArray) -> dict[str, Any]:
+def _write_poses(folder: Path, model: mujoco.MjModel, qpos: FloatArray, times: FloatArray) -> dict[str, Any]:
     kept = np.unique(np.linspace(0, len(qpos) - 1, FRAMES).round().astype(int))
-    (folder / MODEL).write_text(text, encoding="utf-8")
+    mujoco.mj_saveModel(model, str(folder / MODEL))
     np.save(folder / POSES, qpos[kept])
     return {
         "columns": COLUMNS,

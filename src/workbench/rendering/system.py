@@ -7,7 +7,9 @@ import os
 import subprocess
 import sys
 from functools import cache
+from pathlib import Path
 
+from workbench import processes
 from workbench.errors import MissingExtraError
 
 EXTRA = "pip install 'parallel-robot-workbench[rendering]'"
@@ -100,8 +102,10 @@ def refuse_without_display() -> None:
 def _draws(code: str, environment: dict[str, str]) -> bool:
     try:
         done = subprocess.run(
-            [sys.executable, "-c", code],
-            env={**os.environ, **environment},
+            processes.python_code(code),
+            env=processes.environment(**environment),
+            cwd=Path(__file__).parent,  # drivers and their loaders find nothing of the current directory
+            stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
             timeout=PATIENCE_S,

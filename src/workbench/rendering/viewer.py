@@ -12,6 +12,7 @@ import mujoco
 from workbench.errors import MissingExtraError
 from workbench.rendering.poses import Poses
 from workbench.rendering.system import refuse_without_display
+from workbench.shielded import shielded
 
 REFRESH_S = 1 / 60
 CLOSING_S = 5.0
@@ -34,7 +35,8 @@ def view(poses: Poses, speed: float = 1.0) -> None:
         There is no display, or a package is missing; the message says what to install.
     """
     refuse_without_display()
-    import mujoco.viewer
+    with shielded():
+        import mujoco.viewer
 
     if sys.platform == "darwin" and mujoco.viewer._MJPYTHON is None:
         raise MissingExtraError("on macOS the viewer runs under mjpython: mjpython -m workbench.cli model view ...")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import FloatArray
 
-MODEL, POSES = "model.xml", "qpos.npy"
+MODEL, POSES = "model.mjb", "qpos.npy"
 
 
 def rendered(
@@ -34,10 +34,10 @@ def rendered(
 
 
 def draw(folder: Path, width: int, height: int, camera: str) -> None:
-    """Draw each row of ``qpos.npy`` with ``model.xml``; writes height * width * 3 bytes per picture."""
+    """Draw each row of ``qpos.npy`` with ``model.mjb``; writes height * width * 3 bytes per picture."""
     pixels = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever drivers print must not get between the pixels
-    model = mujoco.MjModel.from_xml_path(str(folder / MODEL))
+    model = mujoco.MjModel.from_binary_path(str(folder / MODEL))
     with pixels:
         for picture in rendered(model, np.load(folder / POSES), width, height, camera):
             pixels.write(picture.tobytes())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import workbench.plotting  # noqa: F401  before anything that imports matplotlib
 from workbench.report.build import build_report
 
 __all__ = ["build_report"]

@@ -8,7 +8,7 @@ import gc
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -38,7 +38,13 @@ COLLECT_EVERY = 60
 FORMATS = ("html", "md", "pdf", *DATA_FORMATS)
 
 
-def build_report(run_dir: Path, formats: Sequence[str] = ("html", "md"), style: str = "page") -> list[Path]:
+Show = Callable[[int, int], None]
+"""Called with the number of figures that are drawn, and of all."""
+
+
+def build_report(
+    run_dir: str | Path, formats: Sequence[str] = ("html", "md"), style: str = "page", show: Show | None = None
+) -> list[Path]:
     """Write the report of a finished run beside its results.
 
     Parameters
@@ -51,6 +57,8 @@ def build_report(run_dir: Path, formats: Sequence[str] = ("html", "md"), style: 
         series of each case with units in data/, for other programs.
     style
         ``page``, or ``paper``: figures for the column of a paper.
+    show
+        See `Show`.
 
     Returns
     -------
@@ -75,7 +83,7 @@ def build_report(run_dir: Path, formats: Sequence[str] = ("html", "md"), style: 
         run = load_sweep(run_dir, manifest)
         sections = sweep_sections(run)
     with figure_style(style), _few_collections():
-        files = _rendered(run, sections, formats)
+        files = _rendered(run, sections, formats, show)
     wanted = tuple(name for name in formats if name in DATA_FORMATS)
     if wanted and manifest.sweep is not None:
         raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; a sweep's data are Parquet")
@@ -101,12 +109,17 @@ def _check_choice(what: str, given: Sequence[str], allowed: Iterable[str]) -> No
             raise OutputError(f"report: unknown {what} {name!r}; allowed: {', '.join(allowed)}")
 
 
-def _rendered(run: Run | SweepRun, sections: list[Section], formats: Sequence[str]) -> dict[Path, bytes]:
+def _rendered(
+    run: Run | SweepRun, sections: list[Section], formats: Sequence[str], show: Show | None
+) -> dict[Path, bytes]:
     files: dict[Path, bytes] = {}
     if "pdf" in formats:
         from workbench.report.pdf import all_tables, figure_pdf, report_pdf  # half a second of imports
     figures = run.directory / FIGURES
-    for number, plot in enumerate(plot for section in sections for plot in section.plots):
+    plots = [plot for section in sections for plot in section.plots]
+    for number, plot in enumerate(plots):
+        if show:
+            show(number, len(plots))
         if number % COLLECT_EVERY == COLLECT_EVERY - 1:
             gc.collect()
         if "md" in formats:

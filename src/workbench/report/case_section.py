@@ -22,6 +22,7 @@ from workbench.report.mechanism import mechanism_plot
 from workbench.report.pictures import Film
 from workbench.report.plot import Plot
 from workbench.report.recorded import recorded_tables
+from workbench.report.spent import spent_plot, spent_table
 from workbench.report.tables import CASE_STATUS, KINDS, Cell, Status, Table, columns, verdict_status
 from workbench.report.text import error_fraction, exact, percent, pretty_unit, scientific, with_unit
 
@@ -48,6 +49,7 @@ class CaseView:
     torques: tuple[Plot, ...]
     mechanism: Plot | None
     reactions: Plot | None
+    spent: Plot | None
     tables: tuple[Table, ...]
     film: Film | None = None
     """rendered pictures of the robot in this case, or why there are none; on one case of a run"""
@@ -62,7 +64,7 @@ class CaseView:
     @property
     def plots(self) -> tuple[Plot, ...]:
         """All figures of the case."""
-        others = tuple(plot for plot in (self.mechanism, self.reactions) if plot is not None)
+        others = tuple(plot for plot in (self.spent, self.mechanism, self.reactions) if plot is not None)
         return self.motion + self.torques + others
 
 
@@ -75,6 +77,7 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None, film: Fil
         *recorded_tables(record, anchor),
         *budget_tables(run, case, anchor),
         evidence_table(record, anchor),
+        spent_table(run, record, anchor),
         reactions_table(record, anchor),
         singularity_table(record, anchor),
         conditions_table(record, anchor),
@@ -90,6 +93,7 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None, film: Fil
         torques=tuple(torque_plots(run, case, anchor, series)) if series is not None else (),
         mechanism=mechanism_plot(run, case, anchor, series) if series is not None else None,
         reactions=reaction_plot(run, case, anchor, series) if series is not None else None,
+        spent=spent_plot(run, case, anchor, series) if series is not None else None,
         tables=tuple(table for table in tables if table.rows),
         film=film if film is not None and film.case == case else None,
         times=_times(rows, series) if series is not None else "",

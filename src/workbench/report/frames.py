@@ -93,7 +93,7 @@ class RunFrames:
 
     def _unit(self, column: str) -> str:
         manifest = self.manifest
-        torque = self._torque(column)
+        torque = self._torque(column.replace("part_", "ref_", 1) if column.startswith("part_") else column)
         if torque:
             return manifest.unit_of(torque[2])
         for rate, per in RATES.items():

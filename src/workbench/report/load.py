@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 import pyarrow
 import pyarrow.parquet
-from pydantic import ValidationError
 
 from workbench.arrays import FloatArray
 from workbench.errors import OutputError
-from workbench.report.manifest import FORMAT_VERSION, Manifest, Record
+from workbench.reading import read_bytes
+from workbench.records import read_record, read_text, short
+from workbench.report.manifest import FORMAT_VERSION, Manifest
+
+LARGEST_SERIES = 500_000_000
+"""Bytes of one case's time series that are read."""
 
 UNFINISHED = "journal.jsonl"
 """Holds the cases of a sweep while it runs, or after it was stopped."""
@@ -88,7 +90,8 @@ class Run:
             raise OutputError(f"{self.directory}: case {case!r} cannot be a file name; allowed: one path component")
         try:
             # read_table of a Python file leaves threads behind that abort an interpreter which ends soon after
-            table = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(path.read_bytes())).read(use_threads=False)
+            buffer = pyarrow.BufferReader(read_bytes(path, LARGEST_SERIES))
+            table = pyarrow.parquet.ParquetFile(buffer).read(use_threads=False)
             columns = {name: _floats(table.column(name)) for name in table.column_names}
         except FileNotFoundError as error:
             raise OutputError(f"{path}: missing, though manifest.json lists case {case!r} as computed") from error
@@ -145,50 +148,6 @@ def load_run(directory: Path) -> Run:
     return Run(directory, manifest, rows)
 
 
-def read_text(path: Path) -> str:
-    """Read a file of a run directory.
-
-    Raises
-    ------
-    OutputError
-        It is missing or cannot be read.
-    """
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        held = "a run directory holds manifest.json and summary.csv, or sweep.json in place of it"
-        raise OutputError(f"{path}: missing; {held}") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise OutputError(f"{path}: cannot be read ({short(error)})") from error
-
-
-RecordType = TypeVar("RecordType", bound=Record)
-
-
-def read_record(path: Path, kind: type[RecordType], version: int) -> RecordType:
-    """Read a JSON file of a run directory.
-
-    Raises
-    ------
-    OutputError
-        One line that names the file, the key and the value: missing, torn, of another format, or a wrong entry.
-    """
-    try:
-        data = json.loads(read_text(path))
-    except ValueError as error:
-        raise OutputError(f"{path}: not valid JSON ({short(error)})") from error
-    found = data.get("format") if isinstance(data, dict) else None
-    if found != version:
-        raise OutputError(f"{path}: format {found!r} is not supported; allowed: {version}", key="format")
-    try:
-        return kind.model_validate(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(str(part) for part in first["loc"])
-        value = "" if first["type"] == "missing" else f", got {str(first['input'])[:60]!r}"
-        raise OutputError(f"{path}: key {key!r}: {first['msg']}{value}", key=key) from error
-
-
 def read_manifest(directory: Path) -> Manifest:
     """Read manifest.json of a run directory, with a sweep or without.
 
@@ -211,6 +170,11 @@ def read_manifest(directory: Path) -> Manifest:
     return manifest
 
 
+LONGEST_NUMBER = 40
+"""Characters of a number in summary.csv."""
+
+LARGEST_COUNT = 1e12
+
 REQUIRED_COLUMNS = (
     *("case", "candidate", "reference", "joint", "peak_error", "rms_error", "pointwise_error", "worst_time_s"),
     *("bound", "verdict", "kind", "peak_reference", "unit", "pointwise_skipped"),
@@ -225,47 +189,76 @@ def _recorded(manifest: Manifest, row: ErrorRow) -> tuple[str, ...]:
 def _read_summary(path: Path) -> tuple[ErrorRow, ...]:
     # The csv module and not pandas: a case may be called "nan" or "1e5" and must stay text.
     reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
-    header = reader.fieldnames or []
-    for column in REQUIRED_COLUMNS:
-        if column not in header:
-            raise OutputError(f'{path}: column "{column}" is missing; needed: {", ".join(REQUIRED_COLUMNS)}')
-    rows = []
-    for record in reader:
-        if None in record or None in record.values():
-            raise OutputError(f"{path}: line {reader.line_num}: expected {len(header)} fields; the line is torn")
-        rows.append(_row(path, reader.line_num, record))
-    return tuple(rows)
+    rows: dict[tuple[str, ...], ErrorRow] = {}
+    try:
+        header = reader.fieldnames or []
+        for column in REQUIRED_COLUMNS:
+            if header.count(column) != 1:
+                found = "is missing" if column not in header else f"stands {header.count(column)} times"
+                raise OutputError(f'{path}: column "{column}" {found}; needed: {", ".join(REQUIRED_COLUMNS)}')
+        for record in reader:
+            where = f"{path}: line {reader.line_num}"
+            if None in record or None in record.values():
+                raise OutputError(f"{where}: expected {len(header)} fields; the line is torn")
+            row = _row(path, reader.line_num, record)
+            key = (row.case, row.candidate, row.reference, row.joint)
+            if key in rows:
+                raise OutputError(f"{where}: is there twice: case {', '.join(key)}")
+            rows[key] = row
+    except csv.Error as error:
+        raise OutputError(f"{path}: line {reader.line_num}: {error}") from error
+    return tuple(rows.values())
 
 
 def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
+    def refused(column: str, allowed: str) -> OutputError:
+        return OutputError(
+            f"{path}: line {line}: {column} is {record[column][:60]!r}; allowed: {allowed}", column=column
+        )
+
     def number(column: str) -> float:
+        text = record[column]
         try:
-            return float(record[column])
+            # Python reads 1_000 as a number; nobody writes so many digits
+            return float(text if "_" not in text and len(text) <= LONGEST_NUMBER else "?")
         except ValueError as error:
-            raise OutputError(
-                f"{path}: line {line}: {column} is {record[column][:60]!r}; allowed: a number", column=column
-            ) from error
+            raise refused(column, "a number") from error
+
+    def error(column: str) -> float:
+        value = number(column)
+        if value < 0:
+            raise refused(column, "a number, 0 or more")
+        return value
+
+    def count(column: str) -> int:
+        value = number(column)
+        if not (value >= 0 and value.is_integer() and value < LARGEST_COUNT):
+            raise refused(column, "a count, 0 or more")
+        return int(value)
+
+    def bound() -> float | None:
+        if not record["bound"].strip():
+            return None
+        value = number("bound")
+        if not 0 < value < math.inf:
+            raise refused("bound", "empty, or a number > 0")
+        return value
 
     return ErrorRow(
         case=record["case"],
         candidate=record["candidate"],
         reference=record["reference"],
         joint=record["joint"],
-        peak_error=number("peak_error"),
-        rms_error=number("rms_error"),
-        pointwise_error=number("pointwise_error"),
+        peak_error=error("peak_error"),
+        rms_error=error("rms_error"),
+        pointwise_error=error("pointwise_error"),
         worst_time_s=number("worst_time_s"),
-        bound=number("bound") if record["bound"].strip() else None,
+        bound=bound(),
         verdict=record["verdict"],
         kind=record["kind"],
         peak_reference=number("peak_reference"),
         unit=record["unit"],
-        pointwise_skipped=int(number("pointwise_skipped")),
+        pointwise_skipped=count("pointwise_skipped"),
         normaliser=number("normaliser" if record.get("normaliser") else "peak_reference"),
         uncertainty=number("uncertainty") if record.get("uncertainty", "").strip() else math.nan,
     )
-
-
-def short(error: BaseException) -> str:
-    """Return an error's message as one short line."""
-    return " ".join(str(error).split())[:160] or type(error).__name__

@@ -7,16 +7,12 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import Field
+
+from workbench.records import Record
 
 FORMAT_VERSION = 1
 """The version of the run directory that this reader understands."""
-
-
-class Record(BaseModel):
-    """Base: immutable, tolerant of further keys."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore", protected_namespaces=())
 
 
 class ModelRecord(Record):
@@ -123,6 +119,8 @@ class PowerRecord(Record):
     worst_time_s: float | None = None
     differentiation: float | None = None
     """how well the energy's derivative is known, over peak power"""
+    rounding: float | None = None
+    """what rounding alone may leave of the balance, over peak power"""
     samples: int | None = None
 
 
@@ -130,7 +128,7 @@ class EngineRecord(Record):
     """A second engine against the reference: mass model -> joint -> peak error."""
 
     engine: str
-    spread: dict[str, dict[str, float | None]] = {}
+    spread: dict[str, dict[str, float | None]] = Field(default_factory=dict)
 
 
 class ReplayRecord(Record):
@@ -153,13 +151,15 @@ class ReplaySetRecord(Record):
     start_s: float | None = None
     stop_s: float | None = None
     note: str = ""
-    candidates: dict[str, ReplayRecord] = {}
+    candidates: dict[str, ReplayRecord] = Field(default_factory=dict)
 
 
 class EvidenceRecord(Record):
     """What the reference itself is worth in one case."""
 
-    power_balance: dict[str, PowerRecord] = {}
+    power_balance: dict[str, PowerRecord] = Field(default_factory=dict)
+    undetermined: dict[str, dict[str, float | None]] = Field(default_factory=dict)
+    """what the model leaves open, of each peak torque: mass model -> joint"""
     second_engine: EngineRecord | None = None
     replay: ReplaySetRecord | None = None
 
@@ -175,8 +175,8 @@ class JointRecord(Record):
 class DrawingRecord(Record):
     """What a drawing of the mechanism joins; the points over time stand in the series."""
 
-    links: dict[str, tuple[tuple[str, str], ...]] = {}
-    joints: dict[str, JointRecord] = {}
+    links: dict[str, tuple[tuple[str, str], ...]] = Field(default_factory=dict)
+    joints: dict[str, JointRecord] = Field(default_factory=dict)
     platform: str
     up: tuple[float, float, float]
 
@@ -227,8 +227,16 @@ class RecordedRecord(Record):
     offset_error_s: float | None = None
     notes: tuple[str, ...] = ()
     sentence: str = ""
-    motion: dict[str, SmoothedRecord] = {}
-    joints: dict[str, RecordedJointRecord] = {}
+    motion: dict[str, SmoothedRecord] = Field(default_factory=dict)
+    joints: dict[str, RecordedJointRecord] = Field(default_factory=dict)
+
+
+class SpentRecord(Record):
+    """What a case's torques are spent on: root mean squares, N or N m, by part and by body, joint by joint."""
+
+    mass_model: str = ""
+    parts: dict[str, dict[str, float | None]] = Field(default_factory=dict)
+    bodies: dict[str, dict[str, float | None]] = Field(default_factory=dict)
 
 
 class CaseRecord(Record):
@@ -240,7 +248,7 @@ class CaseRecord(Record):
     message: str | None = None
     samples: int | None = None
     duration_s: float | None = None
-    parameters: dict[str, float | None] = {}
+    parameters: dict[str, float | None] = Field(default_factory=dict)
     external_force: Any = None
     mobility: int | None = None
     rank: int | None = None
@@ -255,22 +263,32 @@ class CaseRecord(Record):
     peak_acceleration: float | None = None
     speed_at_s: float | None = None
     acceleration_at_s: float | None = None
-    singularity: dict[str, SingularityRecord] = {}
-    kinematics: dict[str, float | None] = {}
-    peak_reactions: dict[str, float | None] = {}
+    singularity: dict[str, SingularityRecord] = Field(default_factory=dict)
+    kinematics: dict[str, float | None] = Field(default_factory=dict)
+    peak_reactions: dict[str, float | None] = Field(default_factory=dict)
     conditions: tuple[ConditionRecord, ...] = ()
     solutions_at_start: tuple[tuple[float | None, ...], ...] = ()
     evidence: EvidenceRecord = EvidenceRecord()
     drawing: DrawingRecord | None = None
-    recorded: dict[str, RecordedRecord] = {}
+    recorded: dict[str, RecordedRecord] = Field(default_factory=dict)
+    spent: SpentRecord = SpentRecord()
     warnings: tuple[str, ...] = ()
+
+
+class DiagnosisRecord(Record):
+    """What is wrong with a formula that fails its verification, in a few sentences."""
+
+    reference: str = ""
+    findings: tuple[str, ...] = ()
+    command: str = ""
+    """``workbench diagnose ...``, which says more"""
 
 
 class SweepRecord(Record):
     """That the run is a sweep: then its cases stand in data sets and not here."""
 
     cases: int
-    counts: dict[str, int] = {}
+    counts: dict[str, int] = Field(default_factory=dict)
 
 
 class Manifest(Record):
@@ -281,16 +299,16 @@ class Manifest(Record):
     title: str = ""
     description: str = ""
     spec_file: str = ""
-    spec: dict[str, Any] = {}
+    spec: dict[str, Any] = Field(default_factory=dict)
     model: ModelRecord
     joints: tuple[str, ...]
     coordinate_units: tuple[str, ...]
     force_units: tuple[str, ...]
     platform_axes: tuple[str, ...] = ("x1", "x2", "x3")
-    mobility_count: dict[str, int] = {}
+    mobility_count: dict[str, int] = Field(default_factory=dict)
     parameters: tuple[ParameterRecord, ...] = ()
-    versions: dict[str, str] = {}
-    machine: dict[str, Any] = {}
+    versions: dict[str, str] = Field(default_factory=dict)
+    machine: dict[str, Any] = Field(default_factory=dict)
     git_commit: str | None = None
     engines: tuple[str, ...] = ()
     budget: bool | None = None
@@ -304,6 +322,7 @@ class Manifest(Record):
     claims: tuple[ClaimRecord, ...] = ()
     figures: tuple[FigureRecord, ...] = ()
     cases: dict[str, CaseRecord]
+    diagnosis: dict[str, DiagnosisRecord] = Field(default_factory=dict)
     sweep: SweepRecord | None = None
 
     def unit_of(self, joint: str) -> str:

@@ -8,15 +8,18 @@ from __future__ import annotations
 import base64
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import ValidationError
+from pydantic import Field
 
 from workbench.errors import OutputError
-from workbench.report.load import Run, read_text, short
-from workbench.report.manifest import Record
+from workbench.reading import read_bytes
+from workbench.records import Record, read_record, reason
+from workbench.report.load import Run
 
 FOLDER, RECORD, STILL, FILM = "pictures", "pictures.json", "mechanism.webp", "film.webp"
 FORMAT_VERSION = 1
+MOST_FRAMES, MOST_PIXELS = 10_000, 10_000
 LARGEST = 1_000_000
 """Bytes of a picture that goes into the page."""
 OTHER_MODEL = "the stored pictures show another model"
@@ -33,7 +36,7 @@ class PicturesRecord(Record):
     columns: int = 1
     width: int = 1
     height: int = 1
-    times: tuple[float, ...] = ()
+    times: Annotated[tuple[float, ...], Field(max_length=MOST_FRAMES)] = ()
 
 
 @dataclass(frozen=True)
@@ -83,12 +86,7 @@ def film_of(run: Run) -> Film | None:
     path = run.directory / FOLDER / RECORD
     if not path.exists():
         return None
-    try:
-        record = PicturesRecord.model_validate_json(read_text(path))
-    except ValidationError as error:
-        raise OutputError(f"{path}: not a record of pictures ({short(error)})") from error
-    if record.format != FORMAT_VERSION:
-        raise OutputError(f"{path}: format {record.format} is not supported; allowed: {FORMAT_VERSION}", key="format")
+    record = read_record(path, PicturesRecord, FORMAT_VERSION)
     first = next(iter(run.manifest.cases), "")
     if record.note:
         return Film(first, record.note)
@@ -97,7 +95,8 @@ def film_of(run: Run) -> Film | None:
     if (
         record.case not in run.manifest.cases
         or not record.times
-        or min(record.columns, record.width, record.height) < 1
+        or not min(record.columns, record.width, record.height) >= 1
+        or max(record.columns, record.width, record.height) > MOST_PIXELS
     ):
         raise OutputError(f"{path}: case {record.case!r} with {len(record.times)} frames; needed: a case of the run")
     folder = run.directory / FOLDER
@@ -106,9 +105,11 @@ def film_of(run: Run) -> Film | None:
 
 def _webp(path: Path) -> bytes:
     try:
-        content = path.read_bytes()
+        content = read_bytes(path, LARGEST)
     except OSError as error:
-        raise OutputError(f"{path}: cannot be read ({short(error)})") from error
+        raise OutputError(
+            f"{path}: cannot be read ({reason(error)}); allowed: a WebP picture of at most {LARGEST} bytes"
+        ) from error
     if content[:4] != b"RIFF" or content[8:12] != b"WEBP" or len(content) > LARGEST:
         raise OutputError(f"{path}: {len(content)} bytes; allowed: a WebP picture of at most {LARGEST} bytes")
     return content

@@ -31,6 +31,7 @@ def verdict_section(run: Run) -> Section:
     cases = _cases(len(run.manifest.cases))
     about = f"{model_text(run.manifest)}, {cases}, {tested} candidate{'s' if tested != 1 else ''}."
     context = {"status": status, "sentence": sentence, "about": about, "tables": [table]}
+    context["diagnosis"] = {name: found for name, found in run.manifest.diagnosis.items() if found.findings}
     return Section("verdict", "Verdict", "verdict", context)
 
 

@@ -125,7 +125,7 @@ def edit_file(
     wanted = described.table.changed(values, given)
     refuse_computed(base, given, values)
     refuse_impossible_bodies(base.model, described, loaded.file, values, wanted)
-    text = rewrite(base.model, loaded.source_text, loaded.file, described, values, wanted, base.elements)
+    text = rewrite(base.model, loaded.text, loaded.file, described, values, wanted, base.elements)
     edited = load_edited(base, text, wanted)
     accept(edited)
     _write(target, text, source)
@@ -135,7 +135,7 @@ def edit_file(
         for name, info in described.table.infos.items()
         if after[name] != values[name]
     )
-    return EditResult(source, target, moved, changed_lines(loaded.source_text, text), tuple(_stale(text, moved)))
+    return EditResult(source, target, moved, changed_lines(loaded.text, text), tuple(_stale(text, moved)))
 
 
 def _stale(text: str, moved: Sequence[Change]) -> Iterator[int]:
@@ -166,6 +166,21 @@ def _refuse_target(target: Path) -> None:
         raise OutputError(f"{target}: is a symbolic link; name the file that it leads to")
     if not stat.S_ISREG(mode):
         raise OutputError(f"{target}: is {'a directory' if stat.S_ISDIR(mode) else 'no regular file'}; name a file")
+    _refuse_protected(target)
+
+
+def _refuse_protected(target: Path) -> None:
+    """Refuse a file that its owner has protected, or that has a second name which would keep the old content."""
+    try:
+        status = os.lstat(target)
+    except OSError:
+        return
+    if not status.st_mode & stat.S_IWUSR or not os.access(target, os.W_OK):
+        raise OutputError(f"{target}: is read-only; make it writable or name another file")
+    if status.st_nlink > 1:
+        raise OutputError(
+            f"{target}: has {status.st_nlink} names (hard links), of which one would change; name another file"
+        )
 
 
 def _write(target: Path, text: str, source: Path) -> None:

@@ -12,9 +12,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Protocol
 
 import numpy as np
-from numba import float64, types
 
 from workbench.arrays import FloatArray, as_batch, as_batches
+from workbench.compiled import float64, types
 from workbench.errors import ParameterError
 from workbench.robots.blocks import BLOCK
 

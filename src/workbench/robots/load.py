@@ -7,17 +7,18 @@ robot. Overrides are written into the text (in memory) and compiled again.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import mujoco
 
 from workbench.errors import ModelError, ParameterError
-from workbench.mjcf.compile import compile_text
-from workbench.mjcf.safety import read_text
-from workbench.mjcf.setup import Setup, prepare, says_it_itself
+from workbench.mjcf.files import read_text
+from workbench.mjcf.prepared import Prepared, open_source, prepared_for
+from workbench.mjcf.setup import Setup, says_it_itself
 from workbench.mjcf.text import Element, scan
 from workbench.robots.agreement import refuse_disagreement
 from workbench.robots.assumptions.check import Context, refuse_broken
@@ -29,6 +30,8 @@ from workbench.robots.parameters import Target
 from workbench.robots.robot_file import RobotFile
 from workbench.robots.values import is_written, quotient, read_number, read_parameters, rewrite
 
+NAMES_FILES = re.compile(r"\b(file|\w*dir)\s*=")
+
 
 @dataclass(frozen=True)
 class LoadedModel:
@@ -36,17 +39,33 @@ class LoadedModel:
 
     file: str
     text: str
-    """the MJCF as the reference sees it: actuators, platform and first guess written into it"""
+    """the user's own, with the overrides written into it"""
     model: mujoco.MjModel
-    """compiled from `text`"""
+    """as the reference sees it: actuators, platform and first guess put into it"""
     description: Description | None = None
     """known even where the model breaks the assumptions of its formulas"""
     values: Mapping[str, float] | None = None
     """parameters by name; None where they cannot be read"""
     problem: str = ""
     """why they cannot be read, one line"""
-    source_text: str = field(default="", repr=False)
-    """the MJCF as the user wrote it, with the overrides in it"""
+    prepared: Prepared | None = None
+    """the file with all that it reads, and how its specification is made"""
+
+    def spec(self) -> mujoco.MjSpec:
+        """A fresh specification of `model`, to be changed and compiled."""
+        if self.prepared is None:
+            raise ModelError(f"{self.file}: was not loaded from a text", file=self.file)
+        return self.prepared.spec()
+
+    @property
+    def user(self) -> mujoco.MjModel:
+        """The file as it lies, compiled: with contacts, limits, actuators."""
+        return self.prepared.user if self.prepared else self.model
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of results has to know of the file."""
+        return self.prepared.notes if self.prepared else ()
 
     @property
     def closed_form(self) -> ClosedForm | None:
@@ -108,7 +127,7 @@ def with_overrides(base: Base, overrides: Mapping[str, float]) -> LoadedModel:
     wanted = described.table.changed(values, overrides)
     refuse_computed(base, described.table.expand(overrides), values)
     refuse_impossible_bodies(base.model, described, file, values, wanted)
-    text = rewrite(base.model, loaded.source_text, file, described, values, wanted, base.elements)
+    text = rewrite(base.model, loaded.text, file, described, values, wanted, base.elements)
     return _confirmed(base, text, described, wanted)
 
 
@@ -154,6 +173,8 @@ class Base:
     model: mujoco.MjModel
     """compiled from the user's own text"""
     elements: list[Element]
+    folder: Path | None
+    """from which the model may read other files"""
     setup: Setup | None
     computed: Mapping[str, Target]
     """parameters whose number does not stand in the file -> their place"""
@@ -166,34 +187,51 @@ def read_base(path: str | Path, setup: Setup | None = None, robot: RobotFile | N
 
 
 @lru_cache(maxsize=8)
+def _read_alone(text: str, file: str, path: Path, robot: RobotFile | None, setup: Setup | None) -> Base:
+    return _read(text, file, path, path.parent, robot, setup)
+
+
 def _read_once(text: str, file: str, path: Path, robot: RobotFile | None, setup: Setup | None) -> Base:
-    return _read(text, file, path, robot, setup)
+    """What was read of the same text before, unless the text names other files: those may have changed."""
+    if NAMES_FILES.search(text):
+        return _read(text, file, path, path.parent, robot, setup)
+    return _read_alone(text, file, path, robot, setup)
 
 
-def _read(text: str, file: str, path: Path, robot: RobotFile | None, setup: Setup | None) -> Base:
+def _read(
+    text: str, file: str, path: Path, folder: Path | None, robot: RobotFile | None, setup: Setup | None
+) -> Base:  # fmt: skip
     elements = scan(text, file)
-    model = compile_text(text, file)
+    whole = open_source(text, file, folder, elements)
+    model = whole.user
     if robot is None and setup is None:
         robot = robot_named(model, file) or robot_beside(path)
     if robot is None:
-        seen = _prepared(text, file, model, setup)
-        return Base(LoadedModel(file, *seen, source_text=text), model, elements, setup, {})
+        return Base(_loaded(file, text, _prepared(whole, file, setup)), model, elements, folder, setup, {})
     described = describe(robot, model, text, elements, file)
     setup = setup or robot.setup
     _check(described, model, file, text, None)
     values = read_parameters(model, described, file, text, elements)
     _check(described, model, file, text, values, elements)
-    seen = _prepared(text, file, model, setup)
     computed = {t.reads: t for t in described.targets if t.reads and not is_written(text, elements, t)}
-    return Base(LoadedModel(file, *seen, described, values, source_text=text), model, elements, setup, computed)
+    loaded = _loaded(file, text, _prepared(whole, file, setup), described, values)
+    return Base(loaded, model, elements, folder, setup, computed)
 
 
-def _prepared(text: str, file: str, model: mujoco.MjModel, setup: Setup | None) -> tuple[str, mujoco.MjModel]:
-    """The text that the reference sees, and its model."""
-    if setup is None or says_it_itself(model, setup):
-        return text, model
-    prepared = prepare(text, file, setup, compile_text)
-    return prepared, compile_text(prepared, file)
+def _loaded(
+    file: str,
+    text: str,
+    prepared: Prepared,
+    described: Description | None = None,
+    values: Mapping[str, float] | None = None,
+    problem: str = "",
+) -> LoadedModel:
+    return LoadedModel(file, text, prepared.model, described, values, problem, prepared)
+
+
+def _prepared(whole: Prepared, file: str, setup: Setup | None) -> Prepared:
+    """What the reference sees of a file."""
+    return whole if setup is None or says_it_itself(whole.user, setup) else prepared_for(whole, file, setup)
 
 
 def _check(
@@ -214,14 +252,14 @@ def _check(
 def _confirmed(base: Base, text: str, described: Description, wanted: Mapping[str, float]) -> LoadedModel:
     """Compile an edited text, read it back and refuse it where it does not hold what was asked for."""
     file = base.loaded.file
-    # an edit moves no element, only what lies behind a number in the text
-    elements = base.elements if described.layout is not None else scan(text, file)
-    model = compile_text(text, file)
+    elements = scan(text, file)
+    whole = open_source(text, file, base.folder, elements)
+    model = whole.user
     confirm(model, described, file, text, elements, wanted, base.computed)
     values = dict(wanted) if not base.computed else read_parameters(model, described, file, text, elements)
     # the file's structure was checked once; only numbers that are parameters' own have changed since
     _check(described, model, file, text, values, elements)
-    return LoadedModel(file, *_prepared(text, file, model, base.setup), described, values, source_text=text)
+    return _loaded(file, text, _prepared(whole, file, base.setup), described, values)
 
 
 def load_edited(base: Base, text: str, wanted: Mapping[str, float]) -> LoadedModel:
@@ -232,9 +270,10 @@ def load_edited(base: Base, text: str, wanted: Mapping[str, float]) -> LoadedMod
     ModelError, ParameterError
         See `load_model`.
     """
-    loaded = _read(text, base.loaded.file, Path(base.loaded.file), _robot_of(base), base.setup)
+    file = base.loaded.file
+    loaded = _read(text, file, Path(file), base.folder, _robot_of(base), base.setup)
     assert loaded.loaded.description is not None
-    confirm(loaded.model, loaded.loaded.description, base.loaded.file, text, loaded.elements, wanted, base.computed)
+    confirm(loaded.model, loaded.loaded.description, file, text, loaded.elements, wanted, base.computed)
     return loaded.loaded
 
 
@@ -253,17 +292,18 @@ def open_model(path: str | Path) -> LoadedModel:
     source = find_source(path)
     file, text = source.shown, read_text(source.model)
     elements = scan(text, file)
-    model = compile_text(text, file)
+    whole = open_source(text, file, source.model.parent, elements)
+    model = whole.user
     robot = source.robot or robot_named(model, file) or robot_beside(source.model)
     if robot is None:
-        return LoadedModel(file, text, model, source_text=text)
+        return _loaded(file, text, whole)
     described = describe(robot, model, text, elements, file)
-    seen = _prepared(text, file, model, robot.setup) if described.layout is None else (text, model)
+    seen = _prepared(whole, file, robot.setup) if described.layout is None else whole
     try:
         values = read_parameters(model, described, file, text, elements)
-        return LoadedModel(file, *seen, described, values, source_text=text)
+        return _loaded(file, text, seen, described, values)
     except (ModelError, ParameterError) as error:
-        return LoadedModel(file, *seen, described, None, str(error), source_text=text)
+        return _loaded(file, text, seen, described, None, str(error))
 
 
 def confirm(
@@ -298,15 +338,17 @@ def confirm(
             )
 
 
-def load_text(text: str, file: str) -> LoadedModel:
+def load_text(text: str, file: str, folder: Path | None = None) -> LoadedModel:
     """Load an MJCF text as `load_model` does a file; *file* is the name under which errors speak of it.
+
+    *folder* is the directory from which it may read; None: it reads nothing.
 
     Raises
     ------
     ModelError, ParameterError
         See `load_model`.
     """
-    return _read(text, file, Path(file), None, None).loaded
+    return _read(text, file, Path(file), folder, None, None).loaded
 
 
 __all__ = [

@@ -83,7 +83,7 @@ def candidate(
 
     def register(function: Function) -> Function:
         text = description or (function.__doc__ or "").strip().partition("\n")[0]
-        mark = Registration(str(name or function.__name__), reference, bound, text, source)
+        mark = Registration(function.__name__ if name is None else name, reference, bound, text, source)
         setattr(function, MARK, mark)
         return function
 

@@ -38,11 +38,19 @@ BETWEEN = re.compile(r"(\S+)\s+to\s+(\S+)")
 class PlatformSpec(Strict):
     """What moves: a site, and the coordinates that a task is given in."""
 
-    site: str
+    site: str = ""
+    body: str = ""
+    """the body whose origin is the platform, where the model has no site there"""
     coordinates: Annotated[list[Coordinate], Field(min_length=1, max_length=6)] | None = None
     """task coordinates: positions (m) and angles (rad) in the base body's frame; x y z where not said"""
     names: list[str] | None = None
     """what the robot's source calls them; the coordinates themselves where not said"""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> PlatformSpec:
+        if bool(self.site) == bool(self.body):
+            raise ValueError("give either site or body")
+        return self
 
     @model_validator(mode="after")
     def _each_once(self) -> PlatformSpec:
@@ -111,6 +119,8 @@ class RobotSpec(Strict):
     initial: dict[str, Finite] = Field(default_factory=dict)
     lumped: list[str] = Field(default_factory=list)
     ignore: list[Ignorable] = Field(default_factory=list)
+    fix_base: str = ""
+    """body on a free joint that is held where it is drawn"""
     formulas: list[str] = Field(default_factory=list)
     limits: dict[str, Range] = Field(default_factory=dict)
     groups: dict[Identifier, Annotated[list[str], Field(min_length=1)]] = Field(default_factory=dict)
@@ -195,11 +205,13 @@ class RobotFile:
         return Setup(
             actuated=tuple(spec.actuated),
             platform_site=spec.platform.site,
+            platform_body=spec.platform.body,
             base_body=spec.base,
             keyframe=spec.keyframe,
             initial=tuple(spec.initial.items()),
             lumped_bodies=tuple(spec.lumped),
             ignore=tuple(spec.ignore),
+            fix_base=spec.fix_base,
         )
 
     @cached_property

@@ -55,13 +55,13 @@ def show_parameters(path: str | Path) -> list[ParameterRow]:
     loaded = base.loaded
     if loaded.description is None or loaded.values is None:
         raise no_parameters(loaded.file)
-    elements = scan(loaded.source_text, loaded.file)
+    elements = scan(loaded.text, loaded.file)
     targets = loaded.description.targets
     read_from = {target.reads: target for target in targets if target.reads}
     rows = []
     for name, info in loaded.description.table.infos.items():
         target = read_from[name]
-        place = written(loaded.source_text, elements, target.element, target.name, target.attribute)
+        place = written(loaded.text, elements, target.element, target.name, target.attribute)
         element = place[0] if place else find(elements, target.element, target.name)
         rows.append(
             ParameterRow(

@@ -70,6 +70,8 @@ class ClusterPool:
             self._client = Client(address, timeout=PATIENCE_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise WorkbenchError(f"scheduler {address}: nobody answers: {error}") from error
+        except Exception as error:  # no certificate for TLS, a transport that is not installed: each has its own kind
+            raise WorkbenchError(f"scheduler {address}: cannot be reached this way: {error}") from error
         self._compute = partial(compute_chunk, setup, (time_limit, memory_limit, retries))
 
     def run(self, tasks: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:

@@ -16,6 +16,7 @@ from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate, full_names, load_candidates, with_rows
 from workbench.sweep.evaluate import Context, evaluate, series_bytes
 from workbench.sweep.identity import common_key
+from workbench.sweep.pick import pick_cases
 from workbench.sweep.plan import plan_sweep
 from workbench.sweep.record import FILTERED, GOOD
 from workbench.sweep.run import cores, task_of
@@ -52,8 +53,11 @@ def estimate(
     effort: Effort,
     jobs: int | None,
     candidates: Sequence[str | Path] = (),
+    only: Sequence[str] = (),
 ) -> Estimate:
     """Estimate a campaign; everything in it is resolved and checked as for a run, and nothing is written.
+
+    *only* names the cases that would be run, of a sweep too; none is all.
 
     Raises
     ------
@@ -63,8 +67,10 @@ def estimate(
     names = full_names(candidates)
     users = load_candidates(names)
     campaign = with_rows(campaign, users)
+    if campaign.sweep is not None and only:
+        campaign = pick_cases(campaign, file, model, settings, only, users)
     if campaign.sweep is None:
-        return _of_cases(campaign, file, model, settings, effort, users)
+        return _of_cases(campaign, file, model, settings, effort, users, only)
     effort = Effort(effort.engines, budget=campaign.sweep.budget, drawing=False)
     plan = plan_sweep(campaign, file, model, settings, users)
     common = common_key(campaign, file, plan.model, settings, effort, campaign.sweep.keep_series, users)
@@ -115,8 +121,9 @@ def _of_cases(
     settings: Mapping[str, float],
     effort: Effort,
     users: Sequence[UserCandidate],
+    only: Sequence[str],
 ) -> Estimate:
-    cases = resolve_cases(campaign, file, model, (), settings, (), users)
+    cases = resolve_cases(campaign, file, model, tuple(only), settings, (), users)
     samples = sum(len(case.motion.t) for case in cases)
     short = min(cases, key=lambda case: len(case.motion.t))
     begun = time.perf_counter()

@@ -18,6 +18,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from workbench import reading
 from workbench.campaign import store
 from workbench.campaign.compare import Row
 from workbench.staging import DirectoryKind
@@ -33,6 +34,9 @@ CASES = "cases"
 SUMMARY = "summary"
 PART_CASES = 2000
 """Cases of one part: what is held in memory while parts are written and read."""
+
+LARGEST_PART = 2_000_000_000
+"""Bytes of one part that are read."""
 
 FINISHED = (STATE, SWEEP, CASES, SUMMARY, store.MANIFEST, store.SERIES, *store.REPORTS)
 WORKING = (PROGRESS, journal_file.NAME)
@@ -86,7 +90,7 @@ def write_bytes(path: Path, content: bytes) -> None:
 def read_json(path: Path) -> dict[str, Any] | None:
     """Return a JSON file's content; None where it is missing or torn."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = reading.read_json(path)
     except (OSError, ValueError):
         return None
     return content if isinstance(content, dict) else None
@@ -119,7 +123,10 @@ def write_parts(directory: Path, plan: Plan, journal: Journal) -> None:
 
 
 def _write_table(path: Path, table: pa.Table) -> None:
-    pq.write_table(table, path, compression="zstd")
+    # by way of memory: Arrow opens no file whose name is not UTF-8
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd")
+    path.write_bytes(sink.getvalue())
 
 
 def _fact_names(plan: Plan, journal: Journal) -> list[str]:
@@ -152,12 +159,18 @@ def _summary_table(plan: Plan, records: Sequence[Record]) -> pa.Table:
     return pa.Table.from_pylist(rows, schema=SUMMARY_SCHEMA)
 
 
+def _read_table(path: Path) -> list[dict[str, Any]]:
+    buffer = pa.BufferReader(reading.read_bytes(path, LARGEST_PART))
+    rows: list[dict[str, Any]] = pq.ParquetFile(buffer).read(use_threads=False).to_pylist()
+    return rows
+
+
 def read_records(directory: Path, keys: Sequence[str]) -> Iterator[Record]:
     """Read the records of a finished sweep back from its parts; parts that are torn or missing are left out."""
     for path in sorted((directory / CASES).glob("part-*.parquet")):
         try:
-            cases = pq.read_table(path).to_pylist()
-            rows = pq.read_table(directory / SUMMARY / path.name).to_pylist()
+            cases = _read_table(path)
+            rows = _read_table(directory / SUMMARY / path.name)
         except (OSError, pa.ArrowException):
             continue
         known = {name for name, _ in CASE_COLUMNS} | set(keys)

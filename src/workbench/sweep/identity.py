@@ -12,6 +12,7 @@ from typing import Any
 from workbench.campaign import provenance
 from workbench.campaign.cases import locate, robot_files
 from workbench.campaign.evidence import Effort
+from workbench.campaign.motion_spec import TableMotion
 from workbench.campaign.robot_spec import RobotKeys
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate
@@ -65,7 +66,9 @@ def common_key(
 ) -> str:
     """Hash of everything that the cases of a sweep share."""
     motion = campaign.case[0].motion
-    table = provenance.sha256(locate(file, motion.file, "motion.file").read_bytes()) if motion.kind == "csv" else ""
+    table = ""
+    if isinstance(motion, TableMotion):
+        table = provenance.sha256(locate(file, motion.file, "motion.file").read_bytes())
     filters = campaign.sweep.filter.model_dump() if campaign.sweep else {}
     return _digest(
         {
@@ -80,7 +83,9 @@ def common_key(
             "filter": filters,
             "keep_series": keep_series,
             "keys": campaign.model_dump(include=set(RobotKeys.model_fields) - {"model", "robot"}),
-            "users": {user.name: provenance.sha256(user.file.read_bytes()) for user in users},
+            "users": {
+                user.name: provenance.sha256(b"".join(file.read_bytes() for file in user.files)) for user in users
+            },
         }
     )
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from workbench.campaign import provenance
 from workbench.campaign.cases import locate, robot_files
-from workbench.campaign.recorded_spec import RecordedMotion
-from workbench.campaign.spec import Campaign, CsvMotion
+from workbench.campaign.motion_spec import TableMotion
+from workbench.campaign.spec import Campaign
 
 
 @dataclass(frozen=True)
@@ -51,5 +51,5 @@ def _look(path: Path) -> _Seen:
 def inputs_of(campaign: Campaign, file: Path, model: Path) -> Inputs:
     """The model with its robot file, and the table of a motion given by one."""
     motion = campaign.case[0].motion
-    tables = [locate(file, motion.file, "motion.file")] if isinstance(motion, CsvMotion | RecordedMotion) else []
+    tables = [locate(file, motion.file, "motion.file")] if isinstance(motion, TableMotion) else []
     return Inputs([*robot_files(campaign, file, model), *tables])

@@ -40,7 +40,9 @@ class Journal:
     def __init__(self, path: Path, count: int) -> None:
         self._places = np.full(count, ABSENT, dtype=np.int64)
         self._statuses = np.full(count, ABSENT, dtype=np.int8)
-        self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o644)
+        # without a buffer: a line that was appended is the system's, whatever becomes of this process
+        self._file = os.fdopen(descriptor, "r+b", buffering=0)
         self._end = 0
         try:
             self._scan()
@@ -60,12 +62,10 @@ class Journal:
 
     def close(self) -> None:
         """Close the file."""
-        if self._descriptor >= 0:
-            os.close(self._descriptor)
-            self._descriptor = -1
+        self._file.close()
 
     def _scan(self) -> None:
-        with open(os.dup(self._descriptor), "rb") as stream:
+        with open(os.dup(self._file.fileno()), "rb") as stream:
             stream.seek(0)
             while line := stream.readline(LONGEST_LINE):
                 if line.endswith(b"\n"):
@@ -76,8 +76,8 @@ class Journal:
                 elif len(line) == LONGEST_LINE:
                     self._end += len(line)
         # a torn last line goes, so that the next one starts afresh
-        if os.fstat(self._descriptor).st_size > self._end:
-            os.ftruncate(self._descriptor, self._end)
+        if os.fstat(self._file.fileno()).st_size > self._end:
+            self._file.truncate(self._end)
 
     def _note(self, record: Record, place: int) -> None:
         self._places[record.index] = place
@@ -93,18 +93,19 @@ class Journal:
         """
         line = record.line()
         try:
+            self._file.seek(self._end)
             written = 0
             while written < len(line):
-                written += os.pwrite(self._descriptor, line[written:], self._end + written)
+                written += self._file.write(line[written:]) or 0
         except OSError:
-            os.ftruncate(self._descriptor, self._end)
+            self._file.truncate(self._end)
             raise
         self._note(record, self._end)
         self._end += len(line)
 
     def sync(self) -> None:
         """Make sure that all of it survives a power cut."""
-        os.fsync(self._descriptor)
+        os.fsync(self._file.fileno())
 
     def __contains__(self, index: int) -> bool:
         return bool(self._places[index] != ABSENT)
@@ -139,12 +140,11 @@ class Journal:
         place = int(self._places[index])
         if place == ABSENT:
             raise KeyError(index)
+        self._file.seek(place)
         line = b""
-        while not line.endswith(b"\n"):
-            piece = os.pread(self._descriptor, 16384, place + len(line))
-            if not piece:
-                break
-            line = (line + piece).split(b"\n", 1)[0] + (b"\n" if b"\n" in piece else b"")
+        while b"\n" not in line and (piece := self._file.read(16384)):
+            line += piece
+        line = line[: line.find(b"\n") + 1] or line
         record = parse_line(line)
         if record is None:
             raise OSError(f"case {index} cannot be read back; was the file changed while it was in use?")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationError
 
 from workbench.campaign import store
 from workbench.campaign.lock import holder
 from workbench.errors import OutputError
+from workbench.records import Record, RecordType, read_text, validated
 from workbench.sweep import files
 from workbench.sweep import journal as journal_file
 from workbench.sweep.record import parse_line
@@ -42,43 +46,81 @@ def run_status(directory: Path) -> RunStatus:
     process = holder(directory)
     manifest = files.read_json(directory / store.MANIFEST)
     if manifest is not None and "cases" in manifest and process is None:
-        return _finished(manifest)
+        return _finished(_read(directory / store.MANIFEST, _Manifest))
     state = files.read_json(directory / files.STATE)
     if state is None and process is None:
         raise OutputError(f"{directory}: holds no run of the workbench", path=str(directory))
-    progress: dict[str, Any] = files.read_json(directory / files.PROGRESS) or {}
+    try:
+        return _living(directory, process, state)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise OutputError(
+            f"{directory}: {files.STATE} or {files.PROGRESS}: {first['msg']}", path=str(directory)
+        ) from error
+
+
+def _living(directory: Path, process: int | None, state: dict[str, Any] | None) -> RunStatus:
+    told = files.read_json(directory / files.PROGRESS)
+    progress = _Progress() if told is None else _Progress.model_validate(told)
     counts = _count(directory / journal_file.NAME)
     running = process is not None
     return RunStatus(
         RUNNING if running else STOPPED,
-        str((state or {}).get("campaign", "")),
+        _State.model_validate(state or {}).campaign,
         sum(counts.values()),
-        progress.get("total"),
+        progress.total,
         counts,
-        float(progress.get("rate") or 0.0) if running else 0.0,
-        progress.get("remaining_s") if running else None,
+        progress.rate or 0.0 if running else 0.0,
+        progress.remaining_s if running else None,
         process or None,
     )
 
 
-def _finished(manifest: dict[str, Any]) -> RunStatus:
-    sweep = manifest.get("sweep")
-    if isinstance(sweep, dict):
-        counts = dict(sweep.get("counts", {}))
+class _Case(Record):
+    status: str
+
+
+class _Sweep(Record):
+    counts: dict[str, Annotated[int, Field(ge=0, le=10**12)]] = Field(default_factory=dict)
+
+
+class _Manifest(Record):
+    campaign: str = ""
+    cases: dict[str, _Case]
+    sweep: _Sweep | None = None
+
+
+class _Progress(Record):
+    total: Annotated[int, Field(ge=0, le=10**12)] | None = None
+    rate: Annotated[float, Field(ge=0)] | None = None
+    remaining_s: Annotated[float, Field(ge=0)] | None = None
+
+
+class _State(Record):
+    campaign: str = ""
+
+
+def _finished(manifest: _Manifest) -> RunStatus:
+    if manifest.sweep is not None:
+        counts = dict(manifest.sweep.counts)
     else:
-        counts = {}
-        for case in manifest["cases"].values():
-            counts[case["status"]] = counts.get(case["status"], 0) + 1
+        counts = dict(Counter(case.status for case in manifest.cases.values()))
     total = sum(counts.values())
-    return RunStatus(FINISHED, str(manifest.get("campaign", "")), total, total, counts)
+    return RunStatus(FINISHED, manifest.campaign, total, total, counts)
+
+
+def _read(path: Path, kind: type[RecordType]) -> RecordType:
+    return validated(path, kind, read_text(path))
 
 
 def _count(path: Path) -> dict[str, int]:
     """Finished cases by status; the last line of a case counts."""
     statuses: dict[int, str] = {}
     try:
+        if not path.is_file():
+            return {}
         with path.open("rb") as stream:
-            for line in stream:
+            while line := stream.readline(journal_file.LONGEST_LINE):
                 record = parse_line(line)
                 if record is not None:
                     statuses[record.index] = record.status

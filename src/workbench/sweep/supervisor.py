@@ -7,18 +7,17 @@ waits and restarts; it computes nothing.
 from __future__ import annotations
 
 import contextlib
-import os
 import pickle
 import queue
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
+from workbench import processes
 from workbench.errors import WorkbenchError
 from workbench.sweep.record import FAILED, KILLED, TIMEOUT
 from workbench.sweep.worker import BROKEN, DONE, HEADER, NO_MEMORY, RAISED, READY, receive
@@ -44,9 +43,9 @@ class Lost:
 class _Worker:
     def __init__(self, setup: bytes, inbox: queue.SimpleQueue[Any]) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "workbench.sweep.worker"],
+            processes.python_module("workbench.sweep.worker"),
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-            env=os.environ | ONE_THREAD | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+            env=processes.environment(**ONE_THREAD),
             # Ctrl-C in a terminal goes to the parent alone, which ends its workers itself
             start_new_session=True,
         )  # fmt: skip

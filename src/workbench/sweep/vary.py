@@ -43,7 +43,10 @@ def _faster_cycle(motion: dict[str, Any], factor: float) -> None:
         motion["rate"] *= factor
 
 
-FASTER = {"sine": _faster_sine, "multi_sine": _faster_multi_sine, "pick_and_place": _faster_cycle}
+FASTER = {
+    "sine": _faster_sine, "multi_sine": _faster_multi_sine, "pick_and_place": _faster_cycle,
+    "platform_sine": _faster_sine, "platform_multi_sine": _faster_multi_sine,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

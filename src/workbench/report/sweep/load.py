@@ -14,9 +14,13 @@ from numpy.typing import NDArray
 
 from workbench.arrays import FloatArray
 from workbench.errors import OutputError
-from workbench.report.load import read_record, short
+from workbench.reading import read_bytes
+from workbench.records import read_record, short
 from workbench.report.manifest import Manifest
 from workbench.report.sweep.summary import FORMAT_VERSION, KeyRecord, Summary
+
+LARGEST_PART = 2_000_000_000
+"""Bytes of one part of a data set that are read."""
 
 CONTRAST = "contrast"
 CASES, ROWS, SWEEP = "cases", "summary", "sweep.json"
@@ -114,7 +118,7 @@ def _tables(folder: Path, columns: tuple[str, ...]) -> list[pa.Table]:
 
 def _table(path: Path, columns: tuple[str, ...]) -> pa.Table:
     try:
-        with pq.ParquetFile(path) as file:
+        with pq.ParquetFile(pa.BufferReader(read_bytes(path, LARGEST_PART))) as file:
             known = file.schema_arrow.names
             missing = [name for name in columns if name not in known]
             if missing:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from workbench.report.manifest import Record
+from workbench.records import Record
 
 FORMAT_VERSION = 1
 """The version of sweep.json that this reader understands."""

@@ -1,0 +1,268 @@
+"""Plant mistakes into right formulas and see what `workbench diagnose` makes of them.
+
+    python benchmarks/mistakes.py --count 300 --seed 1 --out mistakes.json [--search] [--at-once 2]
+
+Formulas: the papers' appendix and eq. (4), the 4-RPRP by screws, a Delta and a planar 3-RRR, each as one plain file.
+A mistake is one edit of the kinds of issue "diagnose" (signs, factors, sine for cosine, indices, names, parameters,
+exponents, quotients, terms dropped), chosen at random with equal weight for each kind, on a line that the formula runs
+through. Edits that change no torque at any of the probed states, with parameters varied or not, are no mistakes and are
+drawn again; so are those that make the formula fail everywhere. Truth is taken from the two formulas, right and wrong,
+without the reference: which entries (part, joint) differ, and which parameters' shares do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import tempfile
+import time
+from collections import Counter, defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from workbench.campaign.user_candidates import load_candidates
+from workbench.diagnosis.edits import (
+    DROP,
+    EXPONENT,
+    FACTOR,
+    INDEX,
+    NAME,
+    PARAMETER,
+    QUOTIENT,
+    SIGN,
+    TRIG,
+    WHAT,
+    edits_of,
+)
+from workbench.diagnosis.entries import WRONG_MARK, compare_parts, floors_of
+from workbench.diagnosis.examine import diagnose_subject
+from workbench.diagnosis.parts import FORCE, ODD, REST, take_apart
+from workbench.diagnosis.probes import ask, choose_poses, make_plan
+from workbench.diagnosis.search import groups_of, lines_run, search_mends
+from workbench.diagnosis.surface import subjects
+from workbench.errors import WorkbenchError
+
+ROOT = Path(__file__).resolve().parents[1]
+KINDS = (SIGN, FACTOR, TRIG, INDEX, NAME, PARAMETER, EXPONENT, QUOTIENT, DROP)
+MENDED = {
+    "appendix": (
+        ("Jq33 = df2 * a1", "Jq33 = -df2 * a1"),
+        ("K1 = (p.m2 / 4", "K1 = (p.m2 / 2"),
+        ("K6 * Jxq[:, 2, 2]\n    f3", "K6 * Jxq[:, 2, 1]\n    f3"),
+    ),
+    "equation4": (
+        ("Jq33 = w[:, 1]", "Jq33 = -w[:, 1]"),
+        ("work(2 * p.m5", "work(p.m5"),
+        ("tau = tau - work(p.m1 * gravity, ofC / 2)", "tau = tau - work(p.m1 * gravity, (ofC + ofD) / 2)"),
+        ("- work(p.m6 * gravity, ofI)", "- work(p.m6 * gravity, ofI) - work((p.m3 + p.payload) * gravity, ofx)"),
+    ),
+    "screws": (("np.cross(u, A)", "np.cross(A, u)"),),
+}
+"""What makes the formulas of examples/misprints right."""
+
+
+def formulas(folder: Path, names: list[str]) -> dict[str, tuple[Path, Path, str]]:
+    """Name -> campaign, file with the right formula, candidate."""
+    found = {}
+    for name, mends in MENDED.items():
+        text = (ROOT / "examples" / "misprints" / f"{name}_as_printed.py").read_text()
+        for old, new in mends:
+            assert old in text, old
+            text = text.replace(old, new)
+        path = folder / f"{name}.py"
+        path.write_text(text)
+        campaign = "garcia_murillo_2016" if name == "screws" else "almeida_2010"
+        found[name] = ROOT / "campaigns" / f"{campaign}.toml", path, f"printed-{name}"
+    for name, candidate in (("delta", "exact"), ("rrr", "virtual-work")):
+        home = ROOT / "examples" / name
+        if (home / f"{name}.py").is_file():
+            found[name] = home / f"{name}.toml", home / f"{name}.py", candidate
+    return {name: found[name] for name in names if name in found}
+
+
+def parts_at(subject, plan, changes):
+    """Parts by the formula alone."""
+    tau, _ = ask(plan, lambda q, qd, qdd, force: subject.formula(q, qd, qdd, force, changes))
+    return take_apart(plan, tau, subject.takes_force)
+
+
+class Bench:
+    """One right formula, and what its parts and shares are."""
+
+    def __init__(self, campaign: Path, path: Path, candidate: str, rng: random.Random) -> None:
+        self.campaign, self.path, self.candidate, self.rng = campaign, path, candidate, rng
+        self.text = path.read_text()
+        self.subject = subjects(campaign, candidates=[path], candidate=candidate)[0]
+        self.plan = make_plan(self.subject, choose_poses(self.subject))
+        self.parameters = [p for p in self.subject.parameters if p.read and p.kind in ("mass", "inertia")]
+        self.right = {None: parts_at(self.subject, self.plan, {})}
+        for p in self.parameters:
+            self.right[p.name] = parts_at(self.subject, self.plan, {p.name: p.varied})
+        self.floors = floors_of(self.right[None])
+        lines, groups = lines_run(self.subject, self.plan), groups_of(self.subject.parameters)
+        edits = edits_of(self.text, lines, groups, len(self.subject.joints))
+        self.by_kind = defaultdict(list)
+        for edit in edits:
+            if edit.kind in KINDS:
+                self.by_kind[edit.kind].append(edit)
+
+    def truth(self, subject):
+        """Entries that differ, and parameters whose shares do; None where the formula fails."""
+        wrong = {None: parts_at(subject, self.plan, {})}
+        if not any(np.isfinite(v).any() for v in wrong[None].values()):
+            return None
+        entries = {
+            (e.part, e.joint)
+            for e in compare_parts(wrong[None], self.right[None], self.floors)
+            if e.status == WRONG_MARK
+        }
+        shares = set()
+        for p in self.parameters:
+            moved = parts_at(subject, self.plan, {p.name: p.varied})
+            mine = {k: moved[k] - v for k, v in wrong[None].items()}
+            theirs = {k: v - self.right[None][k] for k, v in self.right[p.name].items()}
+            if any(e.status == WRONG_MARK for e in compare_parts(mine, theirs, self.floors, 1e-6, 1e-10)):
+                shares.add(p.name)
+        if not entries and not shares:
+            return None
+        return entries, shares
+
+    def planted(self, folder: Path, at_once: int):
+        """A subject with so many mistakes, their kinds and lines; its truth."""
+        for _ in range(200):
+            text, lines, kinds = self.text, [], []
+            for _ in range(at_once):
+                kind = self.rng.choice([k for k in KINDS if self.by_kind[k]])
+                edit = self.rng.choice(self.by_kind[kind])
+                if edit.line in lines:
+                    break
+                old = self.text.splitlines()
+                new = edit.apply(self.text).splitlines()
+                changed = [i for i in range(min(len(old), len(new))) if old[i] != new[i]]
+                if len(old) != len(new) or len(changed) != 1:
+                    break
+                rows = text.splitlines(keepends=True)
+                rows[changed[0]] = new[changed[0]] + "\n"
+                text = "".join(rows)
+                lines.append(changed[0] + 1)
+                kinds.append(WHAT[kind])
+            if len(lines) < at_once:
+                continue
+            path = folder / "planted.py"
+            path.write_text(text)
+            try:
+                users = load_candidates([path])
+                case = self.subject.case
+                case.robot.offer({u.name: u.as_candidate() for u in users if u.name == self.candidate})
+                subject = type(self.subject)(case, self.candidate, self.subject.mass_model, self.subject._others)
+                subject.__dict__["motion"] = self.subject.motion
+                subject._references = self.subject._references
+                subject.__dict__["reads"] = self.subject.reads
+                truth = self.truth(subject)
+            except (WorkbenchError, SyntaxError):
+                continue
+            if truth is None:
+                continue
+            return subject, kinds, lines, truth, text
+        raise SystemExit("no mistake to be planted")
+
+
+def judged(bench: Bench, subject, truth, text: str, lines: list[int], search: bool, limit: float) -> dict:
+    """What the diagnosis says of one planted formula, held against the truth."""
+    entries, shares = truth
+    begun = time.perf_counter()
+    diagnosis, seen = diagnose_subject(subject)
+    named = {(e.part, e.joint) for e in diagnosis.wrong if e.part.kind not in (ODD, REST)}
+    true = {(part, joint) for part, joint in entries if part.kind not in (ODD, REST)}
+    kinematic = any(f.kind == "kinematics" for f in diagnosis.findings)
+    parameters = {name for f in diagnosis.findings for name in f.parameters}
+    bodies = {name for f in diagnosis.findings for name in f.bodies}
+    moves = any(part.kind == FORCE for part, _ in entries) or len(shares) > 1
+    row = {
+        "noticed": not diagnosis.right,
+        "joint_and_part": named == true,
+        # kinematics is right where the force response or several masses' shares are wrong, and only there
+        "parameter": (moves if kinematic else parameters == shares or (not shares and bool(bodies)))
+        or (bool(parameters) and parameters <= shares),
+        "seconds_findings": round(time.perf_counter() - begun, 2),
+        "findings": [f.sentence for f in diagnosis.findings],
+    }
+    if search:
+        begun = time.perf_counter()
+        found, _ = search_mends(subject, seen, limit)
+        row["seconds_search"] = round(time.perf_counter() - begun, 2)
+        want = bench.text.splitlines()
+        have = text.splitlines()
+        steps = sorted({s.step for s in found})
+        got = 0
+        for line in lines:
+            for step in steps:
+                alike = [s for s in found if s.step == step][:3]
+                if any(s.line == line and _same(s.after, want[line - 1]) for s in alike):
+                    got += 1
+                    break
+        row["undone"] = got == len(lines)
+        row["complete"] = bool(found) and found[-1].left == 0
+        row["planted"] = [(have[line - 1].strip(), want[line - 1].strip()) for line in lines]
+    return row
+
+
+def _same(one: str, other: str) -> bool:
+    def plain(text: str) -> str:
+        return text.replace(" ", "").replace(".0", "")
+
+    return plain(one) == plain(other)
+
+
+def main() -> None:
+    """Plant, diagnose, count."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--count", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--at-once", type=int, default=1)
+    parser.add_argument("--search", action="store_true")
+    parser.add_argument("--limit", type=float, default=60.0)
+    parser.add_argument("--robots", default="appendix,equation4,screws,delta,rrr")
+    parser.add_argument("--rrr", type=Path, help="folder with rrr.toml and its formula, where examples/ has none")
+    parser.add_argument("--out", type=Path)
+    options = parser.parse_args()
+    rng = random.Random(options.seed)
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        table = formulas(folder, options.robots.split(","))
+        if options.rrr and "rrr" in options.robots.split(","):
+            table["rrr"] = options.rrr / "rrr.toml", next(options.rrr.glob("*.py")), "virtual-work"
+        benches = {robot: Bench(*entry, rng) for robot, entry in table.items()}
+        for number in range(options.count):
+            robot = list(benches)[number % len(benches)]
+            bench = benches[robot]
+            subject, kinds, lines, truth, text = bench.planted(folder, options.at_once)
+            row = {"robot": robot, "kinds": kinds, "lines": lines}
+            row |= judged(bench, subject, truth, text, lines, options.search, options.limit)
+            rows.append(row)
+            print(number, robot, kinds, {k: v for k, v in row.items() if isinstance(v, bool)}, flush=True)
+            if options.out:
+                options.out.write_text(json.dumps(rows, indent=1) + "\n")
+    summary(rows)
+
+
+def summary(rows: list[dict]) -> None:
+    """Print figures by kind of mistake."""
+    keys = [k for k in ("noticed", "joint_and_part", "parameter", "undone", "complete") if k in rows[0]]
+    kinds = Counter(kind for row in rows for kind in row["kinds"])
+    print(f"{'kind':30} {'n':>4} " + " ".join(f"{key:>15}" for key in keys))
+    for kind in [*kinds, "all"]:
+        mine = [row for row in rows if kind == "all" or kind in row["kinds"]]
+        shares = [100 * sum(row[key] for row in mine) / len(mine) for key in keys]
+        print(f"{kind:30} {len(mine):4} " + " ".join(f"{share:13.1f} %" for share in shares))
+    for key in ("seconds_findings", "seconds_search"):
+        if key in rows[0]:
+            times = sorted(row[key] for row in rows)
+            print(f"{key}: median {times[len(times) // 2]:.2f}, longest {times[-1]:.2f}")
+
+
+if __name__ == "__main__":
+    main()

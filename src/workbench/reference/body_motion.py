@@ -1,0 +1,136 @@
+"""How every body moves with the actuated joints: Jacobians per actuated rate, accelerations, axes.
+
+MuJoCo's own Jacobians are folded with W, all velocities per actuated one, so that the loops are in them. What the
+terms of the torque and the inertial regressor are made of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from workbench.arrays import FloatArray
+from workbench.errors import ParameterError
+from workbench.reference.mujoco_reference import MujocoReference
+from workbench.reference.result import ReferenceResult
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """Motion of every body but the world at n samples, world frame, SI; nb bodies, na actuated joints."""
+
+    names: tuple[str, ...]
+    linear: FloatArray
+    """``(n, nb, 3, na)`` velocity of the body's point per actuated rate"""
+    angular: FloatArray
+    """``(n, nb, 3, na)`` angular velocity per actuated rate"""
+    spin: FloatArray
+    """``(n, nb, 3)`` angular velocity, rad/s"""
+    linear_driven: FloatArray
+    """``(n, nb, 3)`` the point's acceleration from qdd alone, m/s^2"""
+    linear_carried: FloatArray
+    """``(n, nb, 3)`` the point's acceleration at qdd = 0, from the rates alone, m/s^2"""
+    angular_driven: FloatArray
+    """``(n, nb, 3)`` angular acceleration from qdd alone, rad/s^2"""
+    angular_carried: FloatArray
+    """``(n, nb, 3)`` angular acceleration from the rates alone, rad/s^2"""
+    axes: FloatArray
+    """``(n, nb, 3, 3)`` world vector = axes @ vector in the frame that inertia is given in"""
+    tangent: FloatArray
+    """``(n, nv, na)`` W, all velocities per actuated one"""
+    springs: FloatArray
+    """``(n, nv)`` forces of springs on all coordinates, N and N m"""
+    dampers: FloatArray
+    """``(n, nv)`` those of dampers of joints and tendons"""
+    fluid: FloatArray
+    """``(n, nv)`` those of a fluid"""
+    result: ReferenceResult
+    """the reference's own inverse dynamics at the samples"""
+
+
+def body_motion(
+    reference: MujocoReference,
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+    mass_model: str = "distributed",
+    external_force: FloatArray | None = None,
+    centres: bool = True,
+    along: ArrayLike | None = None,
+) -> BodyMotion:
+    """Evaluate the motion of every body.
+
+    Parameters
+    ----------
+    reference
+        The robot.
+    q, qd, qdd
+        Actuated motion, ``(n, na)`` each, SI.
+    mass_model
+        ``"distributed"`` or ``"lumped"``.
+    external_force
+        Newtons on the platform, base frame, ``(3,)`` or ``(n, 3)``; it enters the result only.
+    centres
+        True: points are mass centres and axes principal ones; False: points are body frames' origins, axes theirs.
+    along
+        Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
+
+    Raises
+    ------
+    ParameterError
+        More actuators than freedoms: the torque is then no sum over bodies, but one of many.
+    MotionError, ArrayError
+        As `MujocoReference.inverse_dynamics`.
+    """
+    if reference.excess_actuators:
+        raise ParameterError(
+            f"{reference.file}: {reference.excess_actuators} actuator(s) more than freedoms; the torque is one of many"
+            " and has no parts by body"
+        )
+    result = reference.inverse_dynamics(q, qd, qdd, mass_model, external_force, along=along)
+    tangent = reference.tangent(np.asarray(q, dtype=np.float64), near=result.qpos)
+    model = reference.compiled(mass_model)
+    data = mujoco.MjData(model)
+    n, na, nb = len(result.tau), tangent.shape[2], model.nbody - 1
+    linear, angular = np.zeros((2, n, nb, 3, na))
+    spin, carried_l, carried_a = np.zeros((3, n, nb, 3))
+    axes = np.zeros((n, nb, 3, 3))
+    springs, dampers, fluid = np.zeros((3, n, model.nv))
+    point_jac, turn_jac, point_dot, turn_dot = (np.zeros((3, model.nv)) for _ in range(4))
+    # qacc = W qdd + what the loops need at qdd = 0
+    carried = result.qacc - np.einsum("nva,na->nv", tangent, np.asarray(qdd, dtype=np.float64))
+    for sample in range(n):
+        data.qpos[:], data.qvel[:] = result.qpos[sample], result.qvel[sample]
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        springs[sample], dampers[sample], fluid[sample] = data.qfrc_spring, data.qfrc_damper, data.qfrc_fluid
+        positions, frames = (data.xipos, data.ximat) if centres else (data.xpos, data.xmat)
+        axes[sample] = frames[1:].reshape(nb, 3, 3)
+        for body in range(1, model.nbody):
+            mujoco.mj_jac(model, data, point_jac, turn_jac, positions[body], body)
+            mujoco.mj_jacDot(model, data, point_dot, turn_dot, positions[body], body)
+            linear[sample, body - 1] = point_jac @ tangent[sample]
+            angular[sample, body - 1] = turn_jac @ tangent[sample]
+            spin[sample, body - 1] = turn_jac @ data.qvel
+            carried_l[sample, body - 1] = point_jac @ carried[sample] + point_dot @ data.qvel
+            carried_a[sample, body - 1] = turn_jac @ carried[sample] + turn_dot @ data.qvel
+    qdd = np.asarray(qdd, dtype=np.float64)
+    return BodyMotion(
+        names=tuple(model.body(body).name or f"#{body}" for body in range(1, model.nbody)),
+        linear=linear,
+        angular=angular,
+        spin=spin,
+        linear_driven=np.einsum("nbca,na->nbc", linear, qdd),
+        linear_carried=carried_l,
+        angular_driven=np.einsum("nbca,na->nbc", angular, qdd),
+        angular_carried=carried_a,
+        axes=axes,
+        tangent=tangent,
+        springs=springs,
+        dampers=dampers,
+        fluid=fluid,
+        result=result,
+    )

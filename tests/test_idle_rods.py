@@ -1,0 +1,133 @@
+"""Rods between two spherical joints, wherever the loop is cut and however many bodies they are made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workbench.errors import ModelError
+from workbench.mjcf.setup import Setup
+from workbench.reference import MujocoReference
+from workbench.reference.left_open import left_open
+
+HEAD = '<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"><flag contact="disable"/></option><worldbody>'
+CRANK = (
+    '<body name="crank"><joint name="crank" axis="0 0 1"/>'
+    '<geom type="capsule" fromto="0 0 0 .1 0 0" size=".01" mass=".5"/>'
+)
+ROD_MASS = '<geom type="capsule" fromto="0 0 0 .3 .1 .1" size=".006" mass=".2"/>'
+BALL = '<joint name="b1" type="ball"/>'
+PIN = (
+    '<body name="pin" pos=".4 .1 0"><joint name="pin" axis="1 0 0"/>'
+    '<geom type="capsule" fromto="0 0 0 0 0 .1" size=".01" mass=".4"/><site name="out" pos="0 0 .1"/></body>'
+)
+LOOP = '</worldbody><equality><connect name="loop" site1="end" site2="out"/></equality></mujoco>'
+
+
+def rod(joints: str = BALL, mass: str = ROD_MASS, inside: str = '<site name="end" pos=".3 .1 .1"/>') -> str:
+    return f'{HEAD}{CRANK}<body name="rod" pos=".1 0 0">{joints}{mass}{inside}</body></body>{PIN}{LOOP}'
+
+
+PLAIN = rod()
+SAME = {
+    "cut at the far hinge": (
+        f'{HEAD}<site name="foot" pos=".4 .1 0"/>{CRANK}<body name="rod" pos=".1 0 0">{BALL}{ROD_MASS}'
+        '<body name="pin" pos=".3 .1 .1"><joint name="b2" type="ball"/>'
+        '<geom type="capsule" fromto="0 0 -.1 0 0 0" size=".01" mass=".4"/><site name="out"/>'
+        '<site name="low" pos="0 0 -.1"/><site name="low2" pos=".1 0 -.1"/></body></body></body>'
+        '<site name="foot2" pos=".5 .1 0"/></worldbody><equality>'
+        '<connect site1="low" site2="foot"/><connect site1="low2" site2="foot2"/></equality></mujoco>'
+    ),
+    "three hinges in place of the ball": rod(
+        '<joint name="x" axis="1 0 0"/><joint name="y" axis="0 1 0"/><joint name="z" axis="0 0 1"/>'
+    ),
+    "an empty marker on it": rod(inside='<body pos=".15 .05 .05"/><site name="end" pos=".3 .1 .1"/>'),
+    "two bodies welded together": rod(
+        mass='<geom type="capsule" fromto="0 0 0 .3 .1 .1" size=".006" mass=".15"/>',
+        inside='<body pos=".3 .1 .1" euler=".3 .2 .1"><site name="end"/></body>'
+        '<body><geom type="capsule" fromto="0 0 0 .3 .1 .1" size=".006" mass=".05"/></body>',
+    ),
+    "a free body between two connects": (
+        f'{HEAD}{CRANK}<site name="start" pos=".1 0 0"/></body><body name="rod" pos=".1 0 0"><freejoint/>{ROD_MASS}'
+        f'<site name="begin"/><site name="end" pos=".3 .1 .1"/></body>{PIN}</worldbody><equality><connect site1="end"'
+        ' site2="out"/><connect site1="begin" site2="start"/></equality></mujoco>'
+    ),
+}
+
+
+def torque(tmp_path: Path, text: str, **more: object) -> tuple[np.ndarray, np.ndarray, MujocoReference]:
+    path = tmp_path / "model.xml"
+    path.write_text(text, encoding="utf-8")
+    t = np.linspace(0.0, 1.0, 21)[:, None]
+    motion = 0.2 * np.sin(3 * t), 0.6 * np.cos(3 * t), -1.8 * np.sin(3 * t)
+    reference = MujocoReference(path, setup=Setup(("crank",), "out", **more))  # type: ignore[arg-type]
+    result = reference.inverse_dynamics(*motion, external_force=[1.0, 2.0, 3.0])
+    return result.tau, left_open(reference, result, *motion, external_force=np.array([1.0, 2.0, 3.0])), reference
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_the_spin_is_idle_wherever_the_rod_is_cut(tmp_path: Path, name: str) -> None:
+    expected, open_by, plain = torque(tmp_path, PLAIN)
+    assert plain.structure.idle == ("rod",)
+    assert not open_by.any()
+    found, _, reference = torque(tmp_path, SAME[name])
+    assert reference.structure.idle == ("rod",)
+    assert reference.mobility().mobility == 1
+    assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+    heavier = SAME[name].replace('mass=".2"', 'mass=".21"').replace('mass=".05"', 'mass=".06"')
+    assert np.abs(torque(tmp_path, heavier)[0] - expected).max() > 1e-4 * np.abs(expected).max()
+
+
+INERTIAL = (
+    '<inertial pos="0.15 0.05 0.05" quat="0.9758416966222777 0 -0.15448783630654317 0.15448783630654317" mass="0.1567"'
+    ' diaginertia="3.75e-6 {} {}"/>'
+)
+
+
+def test_a_lopsided_rod_is_warned_of_with_its_worth(tmp_path: Path) -> None:
+    uneven, worth, reference = torque(tmp_path, rod(mass=INERTIAL.format(0.004487, 0.004488)))
+    even, none, plain = torque(tmp_path, rod(mass=INERTIAL.format(0.0044875, 0.0044875)))
+    assert not plain.notes
+    assert not none.any()
+    assert any("no body of revolution" in note for note in reference.notes)
+    assert worth == pytest.approx(np.abs(uneven - even).max(axis=0), rel=1e-6)
+    assert 1e-8 < worth[0] / np.abs(even).max() < 1e-4
+    with pytest.raises(ModelError, match="moments of inertia differ around"):
+        torque(tmp_path, rod(mass=INERTIAL.replace("3.75e-6", "5e-4").format(0.0044, 0.0047)))
+
+
+def test_a_lopsided_rod_of_two_bodies(tmp_path: Path) -> None:
+    cap = '<body pos=".3 .1 .1"><geom size=".012" pos=".0003 0 0" mass=".03"/></body><site name="end" pos=".3 .1 .1"/>'
+    even = cap.replace(".0003 0 0", "0 0 0")
+    off, worth, _ = torque(tmp_path, rod(inside=cap))
+    on = torque(tmp_path, rod(inside=even))[0]
+    # the mass centre moves along the axis, too, which is no part of being lopsided
+    assert 0.0 < worth[0] < 10 * np.abs(off - on).max()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            rod(inside='<site name="end" pos=".3 .1 .1"/><geom pos=".1 .1 .2" size=".02" mass=".2"/>'),
+            "mass centre lies",
+        ),
+        (PLAIN.replace('gravity="0 0 -9.81"', 'gravity="0 0 -9.81" viscosity="0.1"'), "a fluid acts on rod"),
+    ],
+)
+def test_what_spins_a_rod_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        torque(tmp_path, text)
+
+
+def test_a_platform_rides_on_no_idle_spin(tmp_path: Path) -> None:
+    path = tmp_path / "model.xml"
+    path.write_text(
+        rod(inside='<site name="end" pos=".3 .1 .1"/><site name="on" pos=".15 .05 .05"/><site name="off"/>')
+    )
+    assert MujocoReference(path, setup=Setup(("crank",), "on"))
+    path.write_text(path.read_text().replace('<site name="off"/>', '<site name="off" pos="0 0 .1"/>'))
+    with pytest.raises(ModelError, match='platform site "off" lies'):
+        MujocoReference(path, setup=Setup(("crank",), "off"))

@@ -1,0 +1,68 @@
+"""Machines of 15 to 60 joints: towers of loops, coupled fingers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from made_machines import hand, tower
+from nullspace_oracle import NullSpaceOracle
+from workbench.reference import MujocoReference
+from workbench.reference.power import PLAIN, power_balance
+
+AGREE = 1e-9
+FORCE = np.array([1.0, 2.0, -3.0])
+MACHINES: dict[str, tuple[Callable[[], tuple[str, list[str]]], str, int, float]] = {
+    "21 joints, 7 loops": (lambda: tower(7, 1), "top6", 21, 0.05),
+    "60 joints, 20 loops": (lambda: tower(20, 2), "top19", 60, 0.02),
+    "15 joints, 14 quartics": (lambda: hand(3), "tip4", 15, 0.05),
+}
+
+
+def made(name: str, tmp_path: Path) -> tuple[MujocoReference, NullSpaceOracle, list[np.ndarray]]:
+    make, _, joints, size = MACHINES[name]
+    text, actuated = make()
+    path = tmp_path / "model.xml"
+    path.write_text(text, encoding="utf-8")
+    oracle = NullSpaceOracle(text, actuated)
+    assert oracle.model.nv == joints
+    rng = np.random.default_rng(3)
+    t = np.linspace(0.0, 1.0, 30)[:, None]
+    phase, rate = rng.uniform(0, 6, len(actuated)), rng.uniform(1, 4, len(actuated))
+    turn = rate * t + phase
+    home = np.array(oracle.model.qpos0)[oracle.adrs]
+    motion = home + size * (np.sin(turn) - np.sin(phase)), size * rate * np.cos(turn), -size * rate**2 * np.sin(turn)
+    return MujocoReference(path), oracle, list(motion)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_torques_are_the_null_spaces(tmp_path: Path, name: str) -> None:
+    reference, oracle, (q, qd, qdd) = made(name, tmp_path)
+    tau = reference.inverse_dynamics(q, qd, qdd, external_force=FORCE).tau
+    site = MACHINES[name][1]
+    for s in (0, 13, 29):
+        pose = oracle.close(oracle.model.qpos0, q[s])
+        expected = oracle.inverse_dynamics(pose, qd[s], qdd[s], site, FORCE).tau
+        assert np.abs(tau[s] - expected).max() < AGREE * np.abs(expected).max()
+        spoiled = oracle.inverse_dynamics(pose, qd[s], 1.0001 * qdd[s], site, FORCE).tau
+        assert np.abs(spoiled - expected).max() > AGREE * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_rounding_of_the_power_balance_is_told_from_wrong_torques(tmp_path: Path, name: str) -> None:
+    reference, _, (q, qd, qdd) = made(name, tmp_path)
+    balance = power_balance(reference, q, qd, qdd, external_force=FORCE)
+    assert balance.uncertainty <= PLAIN
+    tau = reference.inverse_dynamics(q, qd, qdd, external_force=FORCE).tau
+    wrong = power_balance(reference, q, qd, qdd, external_force=FORCE, tau=tau * (1 + 1e-7))
+    assert wrong.uncertainty > 1e-8
+
+
+def test_a_large_machine_reaches_no_more_than_rounding(tmp_path: Path) -> None:
+    reference, _, (q, qd, qdd) = made("60 joints, 20 loops", tmp_path)
+    balance = power_balance(reference, q, qd, qdd, external_force=FORCE)
+    assert balance.relative > PLAIN
+    assert balance.relative < balance.rounding < 100 * balance.relative
