@@ -23,7 +23,14 @@ if TYPE_CHECKING:
     from workbench.errors import WorkbenchError
     from workbench.reference import MujocoReference
     from workbench.report.frames import load_run
-    from workbench.robots.registration import candidate
+    from workbench.report.live import run
+    from workbench.robots.registration import (
+        candidate,
+        closed_form,
+        forward_kinematics,
+        inverse_kinematics,
+        jacobian,
+    )
 
 __all__ = [
     "MujocoReference",
@@ -31,10 +38,15 @@ __all__ = [
     "WorkbenchError",
     "__version__",
     "candidate",
+    "closed_form",
     "diagnose",
+    "forward_kinematics",
+    "inverse_kinematics",
+    "jacobian",
     "load_mechanism",
     "load_robot",
     "load_run",
+    "run",
     "terms",
 ]
 
@@ -42,6 +54,11 @@ _HOMES = {
     "MujocoReference": "workbench.reference",
     "WorkbenchError": "workbench.errors",
     "candidate": "workbench.robots.registration",
+    "closed_form": "workbench.robots.registration",
+    "forward_kinematics": "workbench.robots.registration",
+    "inverse_kinematics": "workbench.robots.registration",
+    "jacobian": "workbench.robots.registration",
+    "run": "workbench.report.live",
     "diagnose": "workbench.diagnosis.surface",
     "load_mechanism": "workbench.capabilities.load:load_robot",
     "load_robot": "workbench.capabilities.load",

@@ -146,6 +146,7 @@ def print_outcome(outcome: Outcome) -> None:
         if kind == RECORDED and rows:
             _print_recorded(manifest)
     out.print(Text("Each error is max|tau - tau_ref| / max|tau_ref| of that joint over the case."), style="dim")
+    _print_kinematics(manifest["cases"])
     for name, case in manifest["cases"].items():
         for warning in case["warnings"]:
             out.print(Text(f'warning: case "{name}": {warning}'), style="yellow")
@@ -172,6 +173,28 @@ def _print_recorded(manifest: dict[str, Any]) -> None:
             out.print(Text(f"  {label}: {record['sentence']}"), soft_wrap=True)
             for note in record["notes"]:
                 out.print(Text(f"  {label}: {note}"), style="dim", soft_wrap=True)
+
+
+def _print_kinematics(cases: dict[str, Any]) -> None:
+    """Print what a user's kinematics are off, coordinate by coordinate."""
+    rows = [(case, row) for case, facts in cases.items() for row in facts.get("kinematics_checks", ())]
+    if not rows:
+        return
+    table = Table(
+        title="Verification: kinematics against MuJoCo", title_justify="left", title_style="bold",
+        box=box.SIMPLE_HEAD, pad_edge=False,
+    )  # fmt: skip
+    for column in ("case", "formula", "kind", "coordinate", "error", "bound", "verdict"):
+        table.add_column(column, overflow="fold", justify="right" if column in ("error", "bound") else "left")
+    previous = ""
+    for case, row in rows:
+        first = case if case != previous else ""
+        cells = [first, row["name"], row["kind"], row["coordinate"], _scientific(row["error"]), f"{row['bound']:.0e}"]
+        table.add_row(*map(Text, cells), Text(row["verdict"], style=STYLES[row["verdict"]]))
+        previous = case
+    out.print(table)
+    said = "Each is the largest error over the case, over the largest value of its unit; of a Jacobian's row, over its"
+    out.print(Text(f"{said} largest entry.", style="dim"))
 
 
 def _print_diagnosis(diagnosis: dict[str, Any]) -> None:

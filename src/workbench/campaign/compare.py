@@ -13,6 +13,7 @@ from workbench.arrays import FloatArray
 from workbench.campaign.candidate_spec import CandidateSpec
 from workbench.campaign.cases import Case, at_time
 from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
+from workbench.campaign.kinematics import check_kinematics
 from workbench.campaign.platform import Platform, platform_of
 from workbench.campaign.recorded import Found, judge
 from workbench.campaign.recorded_spec import RecordedSpec
@@ -157,7 +158,8 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
             facts["spent"] = spent
     poses, drawn = (first.qpos, reference.compiled()) if effort.drawing else (None, None)
     faults = tuple(computed.faults.values())
-    return CaseResult(case.name, rows, series, computed.noted(facts), faults, drawn, poses)
+    facts = check_kinematics(case, reference, platform).noted(computed.noted(facts))
+    return CaseResult(case.name, rows, series, facts, faults, drawn, poses)
 
 
 def _left_out(case: Case, reference: MujocoReference, result: ReferenceResult) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case, course_of
 from workbench.campaign.unloaded import joint_error, largest_reaction
+from workbench.campaign.user_candidates import UserCandidate
 from workbench.errors import CandidateError, MotionError, SpecError, did_you_mean
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.left_open import left_open
@@ -198,12 +199,17 @@ def _replays(case: Case, reference: MujocoReference, candidates: list[str]) -> R
         return None
     window = case.spec.replay
     start, stop = (window.start, window.stop) if window else (float(motion.t[0]), float(motion.t[-1]))
-    torques = {name: torque_of(name) for name in candidates}
+    torques = {name: torque_of(name) for name in candidates if not needs_time(robot.candidates[name].function)}
     try:
         return replay(reference, course_of(case), torques, start, stop, force)
     except MotionError:
         # between the samples the motion may leave the workspace; then there is nothing to drive
         return None
+
+
+def needs_time(function: Any) -> bool:
+    """Whether a formula asks for the time, which the simulation's own states do not have."""
+    return isinstance(function, UserCandidate) and function.needs_time
 
 
 def _replay_facts(found: ReplaySet) -> dict[str, Any]:

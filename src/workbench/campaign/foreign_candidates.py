@@ -63,11 +63,24 @@ class ForeignCandidate(UserCandidate):
         return True
 
     @property
+    def needs_time(self) -> bool:
+        """Formulas in other languages are not told the time."""
+        return False
+
+    @property
     def function(self) -> Any:
         """There is none in Python."""
         return None
 
-    def __call__(self, robot: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> FloatArray:
+    def __call__(
+        self,
+        robot: Robot,
+        q: FloatArray,
+        qd: FloatArray,
+        qdd: FloatArray,
+        force: FloatArray,
+        t: FloatArray | None = None,
+    ) -> FloatArray:
         """Call the formula.
 
         Raises
@@ -136,7 +149,7 @@ def _said(path: Path, text: str) -> Registration:
         found = SAID.search(line)
         if not found:
             continue
-        known = {f.name: f.type for f in fields(Registration)}
+        known = [f.name for f in fields(Registration) if f.name != "kind"]  # kinematics are held in Python only
         try:
             said = tomllib.loads(f"x = {found[1]}")["x"]
         except tomllib.TOMLDecodeError as error:

@@ -20,7 +20,7 @@ from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
 from workbench.campaign.spec import Campaign, load_campaign
-from workbench.campaign.user_candidates import UserCandidate, load_candidates, with_rows
+from workbench.campaign.user_candidates import Formula, UserCandidate, load_candidates, with_rows
 from workbench.campaign.verdict import FAIL, VERIFICATION
 from workbench.errors import OutputError, SpecError, WorkbenchError
 from workbench.staging import check_output, staged
@@ -73,7 +73,7 @@ def run_campaign(
     report: Callable[[Path], object] | None = None,
     pictures: Pictures | None = None,
     effort: Effort = FULL,
-    candidates: Sequence[str | Path] = (),
+    candidates: Sequence[Formula] = (),
     pick: Pick | None = None,
     explain: Explain | None = None,
 ) -> Outcome:
@@ -104,7 +104,7 @@ def run_campaign(
     effort
         How much evidence is gathered beside the errors, and with which engines.
     candidates
-        Python files, or installed entry points, with formulas of the user's own.
+        Python files, or installed entry points, with formulas of the user's own, or functions.
     pick
         Makes a campaign of named cases from one with a sweep, `workbench.sweep.pick.pick_cases`.
     explain
@@ -177,7 +177,7 @@ def run_campaign(
 
 
 def _explained(
-    cases: Sequence[Case], rows: Sequence[Row], path: str | Path, files: Sequence[str | Path], explain: Explain
+    cases: Sequence[Case], rows: Sequence[Row], path: str | Path, files: Sequence[Formula], explain: Explain
 ) -> dict[str, Any]:
     """What is wrong with each formula that fails a verification, and the command that says more."""
     failing: dict[tuple[str, str], list[str]] = {}

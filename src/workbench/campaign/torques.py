@@ -66,7 +66,8 @@ def torques_of(case: Case, names: Iterable[str]) -> Computed:
     for name in names:
         function = robot.candidates[name].function
         try:
-            tau = function(robot, motion.q, motion.qd, motion.qdd, case.force)
+            time = {"t": motion.t} if isinstance(function, UserCandidate) else {}
+            tau = function(robot, motion.q, motion.qd, motion.qdd, case.force, **time)
         except CandidateError as error:
             computed.faults[name] = Fault(str(error), "sample" in error.facts)
             tau = np.full_like(motion.q, np.nan)

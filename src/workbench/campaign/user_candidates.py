@@ -11,7 +11,7 @@ import re
 import statistics
 import time
 import traceback
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import fields, is_dataclass
 from functools import partial
@@ -25,11 +25,12 @@ from workbench.arrays import FloatArray
 from workbench.campaign.bounded_call import TooSlow, UnrulyError, bounded, said
 from workbench.campaign.candidate_spec import LARGEST_BOUND, CandidateSpec
 from workbench.campaign.formula_files import Siblings, load_module
+from workbench.campaign.formula_signature import wants_of
 from workbench.campaign.spec import Campaign
 from workbench.capabilities.robot import Robot
 from workbench.errors import CandidateError, SpecError, did_you_mean
 from workbench.robots.closed_form import Candidate
-from workbench.robots.registration import MARK, Registration
+from workbench.robots.registration import FORWARD, MARK, TORQUE, Registration
 from workbench.schema import NAME, NAME_RULE
 
 LIMIT_S = 60.0
@@ -52,7 +53,7 @@ class UserCandidate:
         self._siblings = siblings
         code = _code_of(function, module)
         self.file, self.line = Path(code.co_filename), code.co_firstlineno
-        self._with_force = _takes_force(function, self.where)
+        self._wants = wants_of(function, registration.kind, self.where)
         self._taken: list[float] = []
 
     @property
@@ -69,7 +70,17 @@ class UserCandidate:
     @property
     def takes_force(self) -> bool:
         """Whether the function is told the external force."""
-        return self._with_force
+        return self._wants.force
+
+    @property
+    def needs_time(self) -> bool:
+        """Whether the function asks for the time, so that only samples of a motion can be handed to it."""
+        return "t" in self._wants.motion
+
+    @property
+    def kind(self) -> str:
+        """``torque``, or which kinematics it is."""
+        return self.registration.kind
 
     @property
     def seconds_per_sample(self) -> float:
@@ -86,28 +97,76 @@ class UserCandidate:
         about = self.registration
         return Candidate(self.name, about.reference, self, about.description, about.source or self.where)
 
-    def __call__(self, robot: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, force: FloatArray) -> FloatArray:
-        """Call the function.
+    def __call__(
+        self,
+        robot: Robot,
+        q: FloatArray,
+        qd: FloatArray,
+        qdd: FloatArray,
+        force: FloatArray,
+        t: FloatArray | None = None,
+    ) -> FloatArray:
+        """Call the function; *t* ``(n,)`` says that the samples are a motion.
 
         Raises
         ------
         CandidateError
             It raised, took too long, or returned something that is no finite array ``(n, na)``; with file and line.
         """
-        given = [_sealed(array) for array in ((q, qd, qdd, force) if self._with_force else (q, qd, qdd))]
+        given = (q, qd, qdd, force) if self._wants.force else (q, qd, qdd)
+        return self._called(robot, given, self._motion(robot, q, qd, qdd, t), q.shape, robot.joints)
+
+    def kinematics(self, robot: Robot, given: FloatArray, expected: FloatArray) -> FloatArray:
+        """Call a kinematics function with q or x; the result has the shape of *expected*.
+
+        Raises
+        ------
+        CandidateError
+            As of a torque.
+        """
+        columns = robot.joints if self.kind != FORWARD else robot.coordinates
+        return self._called(robot, (given,), {}, expected.shape, columns)
+
+    def _motion(
+        self, robot: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, t: FloatArray | None
+    ) -> dict[str, FloatArray]:
+        """What the function asks for by argument name, from the reference."""
+        wanted = self._wants.motion
+        if not wanted:
+            return {}
+        if t is None and "t" in wanted:
+            raise self._fault("asks for the time t, and these samples are no motion")
+        if wanted == ("t",):
+            return {"t": t}  # type: ignore[dict-item]
+        result = robot.reference.inverse_dynamics(q, qd, qdd, along=t)
+        return {name: t if name == "t" else getattr(result, name) for name in wanted}  # type: ignore[misc]
+
+    def _called(
+        self,
+        robot: Robot,
+        arrays: tuple[FloatArray, ...],
+        named: Mapping[str, FloatArray],
+        shape: tuple[int, ...],
+        columns: tuple[str, ...],
+    ) -> FloatArray:
+        given = [_sealed(array) for array in arrays]
+        asked = {name: _sealed(array) for name, array in named.items()}
+        count = shape[0]
         begun = time.perf_counter()
         try:
-            found = bounded(lambda: self._call(robot.parameters, given, q.shape), LIMIT_S)
+            found = bounded(lambda: self._call(robot.parameters, given, asked, shape), LIMIT_S)
         except UnrulyError as trouble:
-            what = f"{trouble} for {len(q)} samples" if isinstance(trouble.error, TooSlow) else str(trouble)
+            what = f"{trouble} for {count} samples" if isinstance(trouble.error, TooSlow) else str(trouble)
             raise self._fault(what + _valid_names(trouble.error, robot.parameters), trouble.error) from trouble.error
-        self._taken.append((time.perf_counter() - begun) / max(len(q), 1))
-        return self._checked(found, q.shape, robot.joints)
+        self._taken.append((time.perf_counter() - begun) / max(count, 1))
+        return self._checked(found, shape, columns)
 
-    def _call(self, parameters: Any, given: list[FloatArray], shape: tuple[int, ...]) -> Any:
+    def _call(
+        self, parameters: Any, given: list[FloatArray], asked: dict[str, FloatArray], shape: tuple[int, ...]
+    ) -> Any:
         """Call the function and turn what it returns into an array, which may run code of the user's as well."""
         with self._siblings.visible() if self._siblings else nullcontext():
-            found = self._function(parameters, *given)
+            found = self._function(parameters, *given, **asked)
             if isinstance(found, np.ndarray):
                 return found.view(np.ndarray) if type(found) is np.ndarray else np.asarray(found)
             if type(found) in (list, tuple):
@@ -118,7 +177,7 @@ class UserCandidate:
                 return np.asarray(found)
         return found
 
-    def _checked(self, found: Any, shape: tuple[int, ...], joints: tuple[str, ...]) -> FloatArray:
+    def _checked(self, found: Any, shape: tuple[int, ...], columns: tuple[str, ...]) -> FloatArray:
         if not isinstance(found, np.ndarray) or found.dtype.kind not in "fiubc":
             kind = f"an array of {found.dtype}" if isinstance(found, np.ndarray) else said(type(found).__name__)
             raise self._fault(f"returns {kind}; expected numbers of shape {shape}")
@@ -126,15 +185,16 @@ class UserCandidate:
             raise self._fault("returns complex numbers; expected real ones")
         if found.shape != shape:
             raise self._fault(
-                f"returns an array of shape {found.shape}; expected {shape}: samples, then {_and(joints)}"
+                f"returns an array of shape {found.shape}; expected {shape}: samples, then {_and(columns)}"
             )
         tau = np.array(found, dtype=np.float64)
         if not np.isfinite(tau).all():
-            sample, joint = np.argwhere(~np.isfinite(tau))[0]
+            sample, *rest = (int(index) for index in np.argwhere(~np.isfinite(tau))[0])
+            what = "joint" if self.kind == TORQUE else "column"
             raise self._fault(
-                f"returns {tau[sample, joint]} for sample {sample}, joint {joints[joint]}"
+                f"returns {tau[(sample, *rest)]} for sample {sample}, {what} {columns[rest[-1]]}"
                 f" ({np.count_nonzero(~np.isfinite(tau))} of {tau.size} entries are not finite)",
-                sample=int(sample),
+                sample=sample,
             )
         return tau
 
@@ -180,34 +240,17 @@ def _code_of(function: Any, module: str) -> CodeType:
     return code
 
 
-def _takes_force(function: Any, where: str) -> bool:
-    """Whether a function takes the external force as its fifth argument."""
-    try:
-        signature = inspect.signature(function)
-    except Exception as error:
-        raise SpecError(f"{where}: what it is called with cannot be told: {said(error)}") from error
-    if inspect.iscoroutinefunction(function) or inspect.isgeneratorfunction(inspect.unwrap(function)):
-        raise SpecError(f"{where}: a candidate returns its torques; this one is called in pieces (async or yield)")
-    parameters = list(signature.parameters.values())
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    needed = [p for p in parameters if p.kind in kinds and p.default is p.empty]
-    taken = [p for p in parameters if p.kind in kinds]
-    if len(needed) > 5 or len(taken) < 4 or any(p.kind is p.KEYWORD_ONLY and p.default is p.empty for p in parameters):
-        raise SpecError(
-            f"{where}: a candidate is called as f(parameters, q, qd, qdd) or f(parameters, q, qd, qdd, external_force),"
-            f" got {said(getattr(function, '__name__', 'f'))}{said(signature)}"
-        )
-    return len(taken) >= 5
+Formula = str | Path | Callable[..., Any]
 
 
-def load_candidates(names: Iterable[str | Path]) -> tuple[UserCandidate, ...]:
-    """Load the candidates of Python files and of installed entry points.
+def load_candidates(names: Iterable[Formula]) -> tuple[UserCandidate, ...]:
+    """Load the candidates of Python files and of installed entry points, or take functions as they are.
 
     Parameters
     ----------
     names
-        Paths of files, ``.py`` or in another language (docs/languages.md), or names of entry points of the group
-        `GROUP`.
+        Paths of files, ``.py`` or in another language (docs/languages.md), names of entry points of the group `GROUP`,
+        or functions, registered or not.
 
     Raises
     ------
@@ -219,6 +262,9 @@ def load_candidates(names: Iterable[str | Path]) -> tuple[UserCandidate, ...]:
 
     found: list[UserCandidate] = []
     for name in names:
+        if not isinstance(name, str | Path):
+            found.append(UserCandidate(name, _mark(name) or _unregistered(name), said(name), None))
+            continue
         if is_foreign(Path(name)):
             found.append(load_foreign(Path(name)))
             continue
@@ -236,7 +282,7 @@ def load_candidates(names: Iterable[str | Path]) -> tuple[UserCandidate, ...]:
         found += {id(one.function): one for one in registered}.values()
     for one in found:
         _check_registration(one)
-        if sum(one.name == other.name for other in found) > 1:
+        if sum((one.name, one.kind) == (other.name, other.kind) for other in found) > 1:
             raise SpecError(f'{one.where}: candidate "{one.name}" is registered twice', candidate=one.name)
     return tuple(found)
 
@@ -247,6 +293,12 @@ def _mark(value: Any) -> Registration | None:
     except Exception:  # an object whose attributes raise is no candidate
         return None
     return mark if isinstance(mark, Registration) else None
+
+
+def _unregistered(function: Callable[..., Any]) -> Registration:
+    """How a plain function is held: a measured modelling error under its own name."""
+    name = said(getattr(function, "__name__", type(function).__name__))
+    return Registration(name, description=said(getattr(function, "__doc__", None) or "").strip().partition("\n")[0])
 
 
 def _check_registration(one: UserCandidate) -> None:
@@ -266,9 +318,20 @@ def _check_registration(one: UserCandidate) -> None:
         )
 
 
-def full_names(names: Iterable[str | Path]) -> tuple[str, ...]:
-    """Names that mean the same in another process: whole paths of files, entry points as they are."""
-    return tuple(str(Path(name).resolve()) if Path(name).is_file() else str(name) for name in names)
+def full_names(names: Iterable[Formula]) -> tuple[str, ...]:
+    """Names that mean the same in another process: whole paths of files, entry points as they are.
+
+    Raises
+    ------
+    SpecError
+        A function, which another process cannot have.
+    """
+    files: list[str | Path] = []
+    for name in names:
+        if not isinstance(name, str | Path):
+            raise SpecError(f"{said(name)}: a sweep computes in other processes; give the file that the function is in")
+        files.append(name)
+    return tuple(str(Path(name).resolve()) if Path(name).is_file() else str(name) for name in files)
 
 
 def offer(robot: Robot, users: Iterable[UserCandidate]) -> None:
@@ -281,11 +344,14 @@ def offer(robot: Robot, users: Iterable[UserCandidate]) -> None:
     """
     extra = {}
     for user in users:
+        if user.kind != TORQUE:
+            continue
         if user.name in robot.candidates:
             raise SpecError(f'{user.where}: {robot.name} already has a candidate "{user.name}"; choose another name')
         extra[user.name] = user.as_candidate()
     if extra:
         robot.offer(extra)
+    robot.offer_kinematics(tuple(user for user in users if user.kind != TORQUE))
 
 
 def with_rows(campaign: Campaign, users: Iterable[UserCandidate]) -> Campaign:
@@ -293,7 +359,7 @@ def with_rows(campaign: Campaign, users: Iterable[UserCandidate]) -> Campaign:
     named = {candidate.name for candidate in campaign.candidate}
     rows = []
     for user in users:
-        if user.name in named:
+        if user.name in named or user.kind != TORQUE:
             continue
         about = user.registration
         rows.append(CandidateSpec(name=user.name, reference=about.reference, bound=about.bound))

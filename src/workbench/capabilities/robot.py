@@ -52,6 +52,7 @@ class Robot(RobotIdentity):
         self._values: dict[str, float] = dict(values if values is not None else base.loaded.values or {})
         self._kind = kind or described.closed_form
         self._extra: ChainMap[str, Candidate] | None = None
+        self.offered_kinematics: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
         """Name, freedoms and parameters."""
@@ -105,7 +106,7 @@ class Robot(RobotIdentity):
             loaded = with_overrides(self._base, {**fixed, **self._description.table.expand(changes)})
             values = dict(loaded.values or {})
         made = Robot(self._base, values, loaded, self._kind)
-        made._extra = self._extra
+        made._extra, made.offered_kinematics = self._extra, self.offered_kinematics
         return made
 
     @property
@@ -151,6 +152,10 @@ class Robot(RobotIdentity):
     def offer(self, candidates: Mapping[str, Candidate]) -> None:
         """Add candidates to those of this robot, and of robots made from it."""
         self._extra = ChainMap(dict(candidates), *(self._extra.maps if self._extra else ()))
+
+    def offer_kinematics(self, formulas: tuple[Any, ...]) -> None:
+        """Add kinematics of a user's own, to be held against the reference."""
+        self.offered_kinematics += formulas
 
     # kinematics
 

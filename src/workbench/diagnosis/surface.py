@@ -14,6 +14,7 @@ from workbench.diagnosis.case_subject import CaseSubject, subjects_of
 from workbench.diagnosis.examine import Examined, diagnose_subject, with_suggestions
 from workbench.diagnosis.result import Diagnosis
 from workbench.errors import SpecError
+from workbench.robots.registration import TORQUE
 
 LIMIT_S = 60.0
 
@@ -116,7 +117,7 @@ def subjects(
         if case not in {one.name for one in cases}:
             raise SpecError(f'{file}: no case "{case}"')
         cases.sort(key=lambda one: one.name != case)
-    own = {user.name for user in users}
+    own = {user.name for user in users if user.kind == TORQUE}
     rows = [
         (row.name, row.reference)
         for row in spec.candidate

@@ -16,6 +16,7 @@ from workbench.report.evidence import (
     solutions_table,
 )
 from workbench.report.figures import motion_plots, reaction_plot, torque_plots
+from workbench.report.kinematics import kinematics_table
 from workbench.report.load import ErrorRow, Run, Series
 from workbench.report.manifest import CaseRecord
 from workbench.report.mechanism import mechanism_plot
@@ -75,6 +76,7 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None, film: Fil
     tables = [
         *(_error_table(run, case, kind, [row for row in rows if row.kind == kind], anchor) for kind in KINDS),
         *recorded_tables(record, anchor),
+        kinematics_table(record, anchor),
         *budget_tables(run, case, anchor),
         evidence_table(record, anchor),
         spent_table(run, record, anchor),

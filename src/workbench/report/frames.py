@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from workbench.errors import OutputError, did_you_mean
 from workbench.report import load
 from workbench.report.manifest import Manifest
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 RATES = {"": "", "d": "/s", "dd": "/s^2"}
 """what a derivative's unit adds to the coordinate's"""
@@ -33,6 +36,12 @@ class RunFrames:
     summary: pd.DataFrame = field(repr=False)
     """one row per case, candidate, reference and joint: errors, bound, verdict"""
     _run: load.Run = field(repr=False)
+
+    def __repr__(self) -> str:
+        """What was run, and how it came out."""
+        verdicts = self.summary["verdict"].value_counts().to_dict() if len(self.summary) else {}
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items()) or "nothing compared"
+        return f"<Run {self.manifest.campaign} in {self.directory}: {self.manifest.status}; {counts}>"
 
     @property
     def cases(self) -> list[str]:
@@ -75,6 +84,29 @@ class RunFrames:
         joints = zip(self.manifest.joints, self.manifest.force_units, strict=True)
         frame.attrs = {"case": case, "units": {"t": "s", "value": dict(joints)}}
         return frame
+
+    def plot(self, case: str | None = None) -> Figure:
+        """Draw the torques of one case, joint by joint: every candidate and reference, and below them the errors.
+
+        Parameters
+        ----------
+        case
+            Its name; None is the first.
+
+        Raises
+        ------
+        OutputError
+            As `series`; or nothing was compared in this case.
+        """
+        from workbench.report.figures import torque_plots
+        from workbench.report.plot import figure_of
+
+        case = self.cases[0] if case is None else case
+        self._check(case)
+        plots = torque_plots(self._run, case, case, self._run.series(case))
+        if not plots:
+            raise OutputError(f'{self.directory}: case "{case}" has no candidate to draw', case=case)
+        return figure_of(plots)
 
     def parameters(self) -> pd.DataFrame:
         """Parameters of the mechanism: name, value, unit, meaning, source."""

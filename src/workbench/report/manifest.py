@@ -239,6 +239,19 @@ class SpentRecord(Record):
     bodies: dict[str, dict[str, float | None]] = Field(default_factory=dict)
 
 
+class KinematicsRecord(Record):
+    """A user's kinematics formula against the reference, one coordinate."""
+
+    name: str
+    kind: str
+    coordinate: str
+    error: float | None
+    scale: float | None = None
+    unit: str = ""
+    bound: float
+    verdict: Literal["pass", "fail"]
+
+
 class CaseRecord(Record):
     """One case: its status and the scalar evidence about mechanism and reference. Missing evidence is None."""
 
@@ -272,6 +285,7 @@ class CaseRecord(Record):
     drawing: DrawingRecord | None = None
     recorded: dict[str, RecordedRecord] = Field(default_factory=dict)
     spent: SpentRecord = SpentRecord()
+    kinematics_checks: tuple[KinematicsRecord, ...] = ()
     warnings: tuple[str, ...] = ()
 
 

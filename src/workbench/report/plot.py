@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from matplotlib.figure import FigureBase
+from matplotlib.figure import Figure, FigureBase
 
 from workbench.report.svg import new_figure, svg_of
 
@@ -32,3 +32,12 @@ class Plot:
         figure = new_figure(*self.size)
         self.draw(figure)
         return svg_of(figure, self.key)
+
+
+def figure_of(plots: Sequence[Plot]) -> Figure:
+    """Draw some plots below each other into one figure, which a notebook shows and ``savefig`` writes."""
+    figure = Figure(figsize=(max(plot.size[0] for plot in plots), sum(plot.size[1] for plot in plots)))
+    parts = figure.subfigures(len(plots), 1, height_ratios=[plot.size[1] for plot in plots], squeeze=False)
+    for plot, part in zip(plots, parts[:, 0], strict=True):
+        plot.draw(part)
+    return figure

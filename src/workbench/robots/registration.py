@@ -30,6 +30,13 @@ def closed_form(kind: Class) -> Class:
     return kind
 
 
+TORQUE = "torque"
+FORWARD, INVERSE, JACOBIAN = "forward kinematics", "inverse kinematics", "jacobian"
+
+KINEMATICS_BOUND = 1e-9
+"""Largest error that a kinematics formula may have where its decorator says no other."""
+
+
 @dataclass(frozen=True)
 class Registration:
     """What a user says about a formula."""
@@ -39,6 +46,7 @@ class Registration:
     bound: float | None = None
     description: str = ""
     source: str = ""
+    kind: str = TORQUE
 
 
 @overload
@@ -65,7 +73,9 @@ def candidate(
     """Register a function ``(parameters, q, qd, qdd) -> tau`` as a candidate.
 
     Arrays are float64, SI, shape ``(n, na)``, in the order of the actuated joints; *parameters* has those of the
-    mechanism as attributes. A function with a fifth argument gets the external force ``(n, 3)`` in newtons too.
+    mechanism as attributes. A function with a fifth argument gets the external force ``(n, 3)`` in newtons too. Further
+    arguments of these names get the platform's motion in the base body's frame: ``x``, ``xd``, ``xdd``, ``omega``,
+    ``alpha``, each ``(n, 3)``, and ``rotation`` ``(n, 3, 3)``; ``t`` gets the times ``(n,)``.
 
     Parameters
     ----------
@@ -84,6 +94,47 @@ def candidate(
     def register(function: Function) -> Function:
         text = description or (function.__doc__ or "").strip().partition("\n")[0]
         mark = Registration(function.__name__ if name is None else name, reference, bound, text, source)
+        setattr(function, MARK, mark)
+        return function
+
+    return register
+
+
+def forward_kinematics(name: Any = None, /, *, bound: float = KINEMATICS_BOUND, description: str = "") -> Any:
+    """Register a function ``(parameters, q) -> x``, task coordinates ``(n, m)``, to be held against the reference.
+
+    Parameters
+    ----------
+    name
+        The name that the report knows it by; the function's own where none is given.
+    bound
+        Largest error allowed: of each coordinate over a case, over the largest value of its unit (m or rad) there.
+    description
+        One line, for the report.
+    """
+    return _kinematics(FORWARD, name, bound, description)
+
+
+def inverse_kinematics(name: Any = None, /, *, bound: float = KINEMATICS_BOUND, description: str = "") -> Any:
+    """Register a function ``(parameters, x) -> q``, as `forward_kinematics`; the branch is that of the case."""
+    return _kinematics(INVERSE, name, bound, description)
+
+
+def jacobian(name: Any = None, /, *, bound: float = KINEMATICS_BOUND, description: str = "") -> Any:
+    """Register a function ``(parameters, q) -> J``, ``(n, m, na)`` with xd = J qd, as `forward_kinematics`.
+
+    The error of a coordinate is that of its row, over the row's largest entry.
+    """
+    return _kinematics(JACOBIAN, name, bound, description)
+
+
+def _kinematics(kind: str, name: Any, bound: float, description: str) -> Any:
+    if callable(name):
+        return _kinematics(kind, None, bound, description)(name)
+
+    def register(function: Function) -> Function:
+        text = description or (function.__doc__ or "").strip().partition("\n")[0]
+        mark = Registration(function.__name__ if name is None else name, "distributed", bound, text, kind=kind)
         setattr(function, MARK, mark)
         return function
 

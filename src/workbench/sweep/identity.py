@@ -16,6 +16,7 @@ from workbench.campaign.motion_spec import TableMotion
 from workbench.campaign.robot_spec import RobotKeys
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate
+from workbench.robots.registration import TORQUE
 
 FORMAT = 1
 """Version of the files of a sweep and of its keys."""
@@ -36,6 +37,10 @@ CODE = (
 """The workbench's own code that makes numbers: two states of it may carry the same version number."""
 
 DESCRIBING = ("name", "title", "description")
+
+
+def _name(user: UserCandidate) -> str:
+    return user.name if user.kind == TORQUE else f"{user.kind} {user.name}"
 
 
 @lru_cache(maxsize=1)
@@ -84,7 +89,7 @@ def common_key(
             "keep_series": keep_series,
             "keys": campaign.model_dump(include=set(RobotKeys.model_fields) - {"model", "robot"}),
             "users": {
-                user.name: provenance.sha256(b"".join(file.read_bytes() for file in user.files)) for user in users
+                _name(user): provenance.sha256(b"".join(file.read_bytes() for file in user.files)) for user in users
             },
         }
     )
