@@ -85,7 +85,8 @@ def test_the_stated_doubt_covers_the_true_error_of_rounding(tmp_path: Path, seed
     if words:
         assert "digits every 5 ms leave" in words
     if figure > TOO_FAR:
-        assert words.endswith("; give velocities and accelerations, or positions and times with all their digits")
+        assert "; give velocities and accelerations, or positions and times with all their digits" in words
+        assert words.endswith(', or kind = "recorded", which smooths them')
 
 
 def doubt_of(path: Path) -> tuple[float, str]:

@@ -27,15 +27,15 @@ def texts(notebook: Any) -> list[list[str]]:
     return found
 
 
-def test_the_notebook_gives_what_it_shows(repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def run_again(file: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any]:
+    """The notebook as kept, and run from top to bottom beside a copy of the folder that it uses."""
     for name in ("JUPYTER_RUNTIME_DIR", "JUPYTER_DATA_DIR", "IPYTHONDIR"):
         monkeypatch.setenv(name, str(tmp_path / name))
     monkeypatch.delenv("MPLBACKEND", raising=False)  # else pictures are not shown
-    file = repository / "examples" / "results.ipynb"
     kept = nbformat.read(file, as_version=4)
     nbformat.validate(kept)
     assert file.stat().st_size < LIGHT
-    shutil.copytree(repository / "examples" / "orthoglide", tmp_path / "examples" / "orthoglide")
+    shutil.copytree(folder, tmp_path / "examples" / folder.name)
     fresh = nbformat.read(file, as_version=4)
     for cell in fresh.cells:
         if cell.cell_type == "code":
@@ -44,6 +44,23 @@ def test_the_notebook_gives_what_it_shows(repository: Path, tmp_path: Path, monk
     NotebookClient(fresh, timeout=300, kernel_name="python3", resources=where).execute()
     assert texts(fresh) == texts(kept)
     assert sum("image/png" in o.get("data", {}) for c in fresh.cells for o in c.get("outputs", [])) == 1
+    return kept, fresh
+
+
+def test_the_notebook_of_recorded_torques_finds_what_was_planted(
+    repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    examples = repository / "examples"
+    kept, _ = run_again(examples / "recorded.ipynb", examples / "recorded", tmp_path, monkeypatch)
+    shown = str(texts(kept))
+    assert "differs" in shown
+    assert "dry friction: +0.04942" in shown  # planted: 0.05 N m
+    assert "scale: +1.06 % " in shown  # planted: 1 %
+
+
+def test_the_notebook_gives_what_it_shows(repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    examples = repository / "examples"
+    kept, fresh = run_again(examples / "results.ipynb", examples / "orthoglide", tmp_path, monkeypatch)
     # units come with the frames; and twin: another number would be seen
     shown = str(texts(kept))
     assert "'ref_distributed_q1': 'N'" in shown

@@ -173,7 +173,7 @@ def test_a_file_of_formulas_is_read_as_it_stands(tmp_path: Path, monkeypatch: py
 
 COMPLAINTS = {
     "no such file": ("absent.py", None, "absent.py: no such Python file, nor an installed entry point"),
-    "not python": ("fourbar.xml", None, "its name ends in .py"),
+    "not python": ("fourbar.xml", None, "candidates stand in a file .py, .m, .c"),
     "nothing registered": ("empty.py", "x = 1\n", "empty.py: no candidate is registered in it"),
     "syntax": ("bad.py", "def f(:\n", "bad.py:1: invalid syntax"),
     "fails on import": ("bad.py", "\n\n1 / 0\n", "bad.py:3: ZeroDivisionError"),

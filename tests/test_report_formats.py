@@ -79,7 +79,7 @@ def test_hostile_names_survive_every_format(tmp_path: Path) -> None:
 
 def test_an_unknown_format_or_style_is_refused(tmp_path: Path) -> None:
     folder = make_run(tmp_path / "run", cases=1, samples=20)
-    with pytest.raises(OutputError, match="unknown format 'docx'; allowed: html, md, pdf"):
+    with pytest.raises(OutputError, match="unknown format 'docx'; allowed: html, md, pdf, csv, mat"):
         build_report(folder, ["docx"])
     with pytest.raises(OutputError, match="unknown style 'loud'; allowed: page, paper"):
         build_report(folder, ["md"], "loud")

@@ -38,6 +38,7 @@ computed alone, in a vector register with others, or in another thread. A divisi
 ROOT = Path(__file__).parent
 
 KERNEL_FILES = (
+    "recorded/kernels.py",
     # each robot that comes with the package keeps its machine code in files of these names
     *(
         path.relative_to(ROOT).as_posix()

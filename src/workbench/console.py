@@ -20,7 +20,9 @@ from rich.text import Text
 from workbench.campaign.compare import Row
 from workbench.campaign.run import Outcome
 from workbench.campaign.verdict import (
+    AGREES,
     CONTRAST,
+    DIFFERS,
     EXPECTED_FAIL,
     EXPECTED_FAILURE,
     FAIL,
@@ -28,6 +30,7 @@ from workbench.campaign.verdict import (
     MEASURED,
     MODELLING,
     PASS,
+    RECORDED,
     UNDECIDED,
     UNEXPECTED_PASS,
     VERIFICATION,
@@ -53,7 +56,7 @@ err = _console(stderr=True)
 
 STYLES = {
     FAIL: "bold red", UNEXPECTED_PASS: "bold red", UNDECIDED: "bold magenta", EXPECTED_FAIL: "yellow",
-    PASS: "green", MEASURED: "cyan",
+    DIFFERS: "yellow", PASS: "green", AGREES: "green", MEASURED: "cyan",
 }  # fmt: skip
 """Colour of each verdict; a row of the table shows the first of them that one of its joints has."""
 
@@ -133,12 +136,15 @@ def print_outcome(outcome: Outcome) -> None:
         (VERIFICATION, "Verification: closed form against MuJoCo, same masses", _scientific),
         (EXPECTED_FAILURE, "Declared failures: what each mistake costs, joint by joint", _percent),
         (MODELLING, "Modelling error: what the simpler mass model costs", _percent),
+        (RECORDED, "Measured or simulated elsewhere: recorded torques against MuJoCo, as found by error", _percent),
         (CONTRAST, "For contrast: MuJoCo's inverse dynamics without projection", _percent),
     )
     for kind, title, show in tables:
         rows = [row for row in outcome.rows if row.kind == kind]
         if rows:
             out.print(_table(title, rows, manifest["joints"], show))
+        if kind == RECORDED and rows:
+            _print_recorded(manifest)
     out.print(Text("Each error is max|tau - tau_ref| / max|tau_ref| of that joint over the case."), style="dim")
     _print_kinematics(manifest["cases"])
     for name, case in manifest["cases"].items():
@@ -156,6 +162,17 @@ def print_outcome(outcome: Outcome) -> None:
     _print_diagnosis(manifest.get("diagnosis", {}))
     out.print(_verdict(outcome))
     out.print(Text(f"Report: {outcome.directory / 'report.html'}"), soft_wrap=True)
+
+
+def _print_recorded(manifest: dict[str, Any]) -> None:
+    """Why each record is judged as it is, and where its difference lies."""
+    for case in manifest["cases"].values():
+        for label, record in case.get("recorded", {}).items():
+            for joint, found in record["joints"].items():
+                out.print(Text(f"  {label}, {joint}: {found['reason']}"), soft_wrap=True)
+            out.print(Text(f"  {label}: {record['sentence']}"), soft_wrap=True)
+            for note in record["notes"]:
+                out.print(Text(f"  {label}: {note}"), style="dim", soft_wrap=True)
 
 
 def _print_kinematics(cases: dict[str, Any]) -> None:

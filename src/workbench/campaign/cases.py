@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.campaign.motion_spec import MAX_SAMPLES
+from workbench.campaign.motion_spec import MAX_SAMPLES, RecordedMotion
 from workbench.campaign.planned import formula_of, planned_motion
+from workbench.campaign.recorded import read_torques, recorded_motion, records_of
+from workbench.campaign.recorded_spec import RecordedSpec
 from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.user_candidates import UserCandidate, offer
 from workbench.capabilities.load import robot_with
@@ -19,6 +21,7 @@ from workbench.data_files import bundled, bundled_names
 from workbench.documents import shorten
 from workbench.errors import MotionError, SpecError, WorkbenchError, did_you_mean
 from workbench.motion import JointMotion, PlatformMotion
+from workbench.recorded.read import Record
 from workbench.reference.replay import motion_through
 from workbench.robots.assignments import resolve_changes
 from workbench.robots.catalogue import bundled_robot, bundled_robots
@@ -39,6 +42,8 @@ class Case:
     xd: FloatArray = field(repr=False)
     xdd: FloatArray = field(repr=False)
     """the platform's motion in task coordinates, ``(n, m)``, by closed form where there is one"""
+    records: tuple[tuple[RecordedSpec, Record], ...] = field(default=(), repr=False)
+    """torques from elsewhere"""
 
     @property
     def name(self) -> str:
@@ -103,7 +108,12 @@ def resolve_cases(
                 overrides = table.layered(overrides, resolve_changes(table, before.values, relative))
             robot = robot_once(overrides)
             _check_candidates(campaign, robot)
-            cases.append(_resolve(spec, file, path, overrides, robot))
+            case = _resolve(spec, file, path, overrides, robot)
+            records = tuple(
+                (one, read_torques(one, locate(file, one.file, "recorded.file"), robot))
+                for one in records_of(campaign.recorded, spec.name, names, str(file))
+            )
+            cases.append(replace(case, records=records))
         except WorkbenchError as error:
             raise _in_case(error, file, spec.name) from error
     return cases
@@ -219,6 +229,10 @@ def _check_candidates(campaign: Campaign, robot: Robot) -> None:
             if failing not in robot.joints:
                 hint = did_you_mean(failing, robot.joints)
                 raise SpecError(f'candidate "{candidate.name}": expect_fail: no joint "{shorten(failing)}"{hint}')
+    for record in campaign.recorded:
+        if record.reference not in robot.mass_models:
+            hint = did_you_mean(record.reference, robot.mass_models)
+            raise SpecError(f'recorded "{record.label}": no reference "{record.reference}"{hint}')
     for figure in campaign.figure:
         if (figure.kind == "torque" or figure.joint) and figure.joint not in robot.joints:
             hint = did_you_mean(str(figure.joint), robot.joints)
@@ -283,6 +297,8 @@ def plan_motion(spec: CaseSpec, file: Path, robot: Robot) -> JointMotion | Platf
     ParameterError
         Another number of joints than the mechanism has.
     """
+    if isinstance(spec.motion, RecordedMotion):
+        return recorded_motion(spec.motion, locate(file, spec.motion.file, "motion.file"), robot)
     return planned_motion(
         spec.motion,
         lambda name: locate(file, name, "motion.file"),

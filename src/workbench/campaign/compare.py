@@ -15,13 +15,16 @@ from workbench.campaign.cases import Case, at_time
 from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
 from workbench.campaign.kinematics import check_kinematics
 from workbench.campaign.platform import Platform, platform_of
+from workbench.campaign.recorded import Found, judge
+from workbench.campaign.recorded_spec import RecordedSpec
 from workbench.campaign.spec import Campaign
 from workbench.campaign.spent import spent_on
 from workbench.campaign.torques import Fault, torques_of
 from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
-from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, kind_of, verdict_of
+from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, RECORDED, kind_of, verdict_of
 from workbench.errors import ModelError, MotionError
 from workbench.hints import hint_of
+from workbench.recorded.read import Record
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.crossings import look, refuse_crossings, worth
 from workbench.reference.raw_inverse import raw_mj_inverse
@@ -102,7 +105,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     results: dict[str, ReferenceResult] = {}
     series = _motion_columns(case)
     try:
-        for mass_model in dict.fromkeys(c.reference for c in campaign.candidate) or ("distributed",):
+        for mass_model in _references(campaign, case):
             results[mass_model] = reference.inverse_dynamics(
                 motion.q, motion.qd, motion.qdd, mass_model, case.force, along=motion.t
             )
@@ -124,6 +127,8 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     ]
     rows = [dataclasses.replace(row, verdict=FAIL) if row.candidate in computed.faults else row for row in rows]
     hints = _hints(case, rows, torques, results)
+    recorded = [_recorded(case, spec, record, reference, results, evidence) for spec, record in case.records]
+    rows += [row for found in recorded for row in _recorded_rows(case, found, evidence)]
     if effort.budget:
         rows += _raw_rows(case, reference, results, evidence)
     for mass_model, result in results.items():
@@ -131,11 +136,16 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     for name in sound:
         tau = torques[name]
         series |= _columns(f"cand_{name}", tau, robot.joints)
+    for found in recorded:
+        series |= _columns(f"rec_{found.spec.label}", found.tau, robot.joints)
+        series |= _columns(f"band_{found.spec.label}", found.band, robot.joints)
     first = next(iter(results.values()))
     for joint, force in first.reactions.items():
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual
     facts = _facts(case, reference, first, rows, platform) | {"evidence": evidence.facts()}
+    if recorded:
+        facts["recorded"] = {found.spec.label: found.facts for found in recorded}
     facts["warnings"] = [*facts["warnings"], *hints, *left]
     if effort.drawing:
         drawing = skeleton(reference, first.qpos)
@@ -239,6 +249,50 @@ def _rows(
             )
         )
     return rows
+
+
+def _references(campaign: Campaign, case: Case) -> tuple[str, ...]:
+    named = [c.reference for c in campaign.candidate] + [spec.reference for spec, _ in case.records]
+    return tuple(dict.fromkeys(named)) or ("distributed",)
+
+
+def _recorded(
+    case: Case,
+    spec: RecordedSpec,
+    record: Record,
+    reference: MujocoReference,
+    results: Mapping[str, ReferenceResult],
+    evidence: Evidence,
+) -> Found:
+    own = {joint: evidence.uncertainty(spec.reference, joint) for joint in case.robot.joints}
+    result = results[spec.reference]
+    return judge(spec, record, case.motion, case.force, case.robot, reference, result, own)
+
+
+def _recorded_rows(case: Case, found: Found, evidence: Evidence) -> list[Row]:
+    return [
+        Row(
+            case=case.name,
+            candidate=found.spec.label,
+            reference=found.spec.reference,
+            joint=one.joint,
+            peak_error=one.error.peak_error,
+            rms_error=one.error.rms_error,
+            pointwise_error=one.error.pointwise_error,
+            worst_time_s=float(case.motion.t[one.error.worst_index]),
+            bound=found.spec.bound,
+            verdict=one.verdict,
+            kind=RECORDED,
+            unit=case.robot.force_units[i],
+            peak_reference=one.error.peak_reference,
+            pointwise_skipped=one.error.pointwise_skipped,
+            normaliser=one.normaliser,
+            uncertainty=one.uncertainty,
+            power_residual=evidence.power_residual(found.spec.reference),
+            engine_spread=evidence.engine_spread(found.spec.reference, one.joint),
+        )
+        for i, one in enumerate(found.joints)
+    ]
 
 
 def _columns(prefix: str, values: FloatArray, joints: tuple[str, ...]) -> dict[str, FloatArray]:

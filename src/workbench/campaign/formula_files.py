@@ -117,7 +117,9 @@ def load_module(name: str, limit_s: float) -> tuple[ModuleType, Siblings | None]
             file=name,
         )
     if path.suffix != ".py":
-        raise SpecError(f"{name}: candidates stand in a Python file, its name ends in .py", file=name)
+        raise SpecError(
+            f"{name}: candidates stand in a file .py, .m, .c, .so, .jl, .R or in a program that can be run", file=name
+        )
     whole = path.resolve()
     loader = _Uncached(f"workbench_candidates_{path.stem}", str(whole))
     spec = importlib.util.spec_from_loader(loader.name, loader)

@@ -110,20 +110,40 @@ class PlatformCsvMotion(TableMotion):
     kind: Literal["platform_csv"]
 
 
+class ColumnSpec(Strict):
+    """A column of a table, by its header, and the unit where the header does not say it."""
+
+    name: str = ""
+    unit: str = ""
+
+
+Columns = dict[str, str | ColumnSpec]
+"""``t``, a joint or ``q1``, ``tau_JOINT`` or ``tau1`` -> header, or header and unit"""
+
+
+class RecordedMotion(TableMotion):
+    """Coordinates from a table, differentiated as their noise and digits allow; what that leaves open is stated."""
+
+    kind: Literal["recorded"]
+    columns: Columns = Field(default_factory=dict)
+
+
 MOTIONS: dict[str, type[Strict]] = {
     "sine": SineMotion, "multi_sine": MultiSineMotion, "pick_and_place": CycleMotion, "csv": CsvMotion,
     "platform_sine": PlatformSineMotion, "platform_multi_sine": PlatformMultiSineMotion,
-    "platform_csv": PlatformCsvMotion,
+    "platform_csv": PlatformCsvMotion, "recorded": RecordedMotion,
 }  # fmt: skip
 """By their ``kind``."""
 
-Motion = Annotated[
+PlannedMotion = (
     SineMotion
     | MultiSineMotion
     | CycleMotion
     | CsvMotion
     | PlatformSineMotion
     | PlatformMultiSineMotion
-    | PlatformCsvMotion,
-    Field(discriminator="kind"),
-]
+    | PlatformCsvMotion
+)
+"""What is known to all digits, or taken to be."""
+
+Motion = Annotated[PlannedMotion | RecordedMotion, Field(discriminator="kind")]

@@ -14,6 +14,7 @@ from workbench.campaign.motion_spec import (
     CycleMotion,
     Motion,
     MultiSineMotion,
+    PlannedMotion,
     PlatformCsvMotion,
     PlatformMultiSineMotion,
     PlatformSineMotion,
@@ -38,7 +39,7 @@ from workbench.motion import (
 
 
 def planned_motion(
-    motion: Motion,
+    motion: PlannedMotion,
     located: Callable[[str], Path],
     robot: str,
     joints: tuple[str, ...],

@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
 from workbench.campaign.motion_spec import MOTIONS, Motion
+from workbench.campaign.recorded_spec import RecordedSpec
 from workbench.campaign.robot_spec import RobotKeys
 from workbench.campaign.sweep_spec import Filter, SweepSpec, Vary
 from workbench.data_files import bundled, bundled_names
@@ -101,14 +102,18 @@ class Campaign(RobotKeys):
     candidate: list[CandidateSpec] = Field(default_factory=list)
     """may be empty where the campaign brings its own mechanism: then the reference alone is computed"""
     case: Annotated[list[CaseSpec], Field(min_length=1)]
+    recorded: list[RecordedSpec] = Field(default_factory=list)
+    """torques from elsewhere; their rows are a kind of their own"""
     claim: list[ClaimSpec] = Field(default_factory=list)
     figure: list[FigureSpec] = Field(default_factory=list)
     sweep: SweepSpec | None = None
 
     @model_validator(mode="after")
     def _one_case_varies(self) -> Campaign:
-        if self.sweep and (len(self.case) != 1 or self.claim or self.figure):
-            raise ValueError("a campaign with a sweep has one case, which varies, and neither claims nor figures")
+        if self.sweep and (len(self.case) != 1 or self.claim or self.figure or self.recorded):
+            raise ValueError(
+                "a campaign with a sweep has one case, which varies; no claims, no figures, no recorded torques"
+            )
         return self
 
 
@@ -167,7 +172,7 @@ FORM = Form(
     Campaign,
     sections={
         "candidate": CandidateSpec, "case": CaseSpec, "claim": ClaimSpec, "figure": FigureSpec, "measure": Measure,
-        "sweep": SweepSpec, "vary": Vary, "filter": Filter, "printed_cost": PrintedCost,
+        "recorded": RecordedSpec, "sweep": SweepSpec, "vary": Vary, "filter": Filter, "printed_cost": PrintedCost,
     },
     kinds=MOTIONS,
     kinds_of="motion",
@@ -176,7 +181,7 @@ FORM = Form(
 
 def _check_names(campaign: Campaign, file: str) -> None:
     """Names that have to be unique, and names that have to exist."""
-    if not campaign.candidate and campaign.actuated is None and campaign.robot is None:
+    if not campaign.candidate and campaign.actuated is None and campaign.robot is None and not campaign.recorded:
         raise SpecError(f"{file}: candidate: missing; a campaign compares at least one", file=file)
     cases = [case.name for case in campaign.case]
     for name in cases:

@@ -249,7 +249,8 @@ def load_candidates(names: Iterable[Formula]) -> tuple[UserCandidate, ...]:
     Parameters
     ----------
     names
-        Paths of ``.py`` files, names of entry points of the group `GROUP`, or functions, registered or not.
+        Paths of files, ``.py`` or in another language (docs/languages.md), names of entry points of the group `GROUP`,
+        or functions, registered or not.
 
     Raises
     ------
@@ -257,10 +258,15 @@ def load_candidates(names: Iterable[Formula]) -> tuple[UserCandidate, ...]:
         No such file or entry point; the file does not run (with its own line); nothing is registered in it; a name
         that stands twice.
     """
+    from workbench.campaign.foreign_candidates import is_foreign, load_foreign
+
     found: list[UserCandidate] = []
     for name in names:
         if not isinstance(name, str | Path):
             found.append(UserCandidate(name, _mark(name) or _unregistered(name), said(name), None))
+            continue
+        if is_foreign(Path(name)):
+            found.append(load_foreign(Path(name)))
             continue
         module, siblings = load_module(str(name), LOADING_LIMIT_S)
         registered = [

@@ -17,14 +17,22 @@ EXPECTED_FAIL = "expected-fail"
 UNEXPECTED_PASS = "unexpected-pass"
 UNDECIDED = "undecided"
 
+AGREES = "agrees"
+"""recorded torques: the difference lies within what motion and recorder leave open"""
+DIFFERS = "differs"
+"""recorded torques: it does not"""
+
 FAILURES = frozenset({FAIL, UNEXPECTED_PASS, UNDECIDED})
 """Verdicts that fail a campaign."""
 
 VERIFICATION = "verification"
 MODELLING = "modelling"
 EXPECTED_FAILURE = "expected-failure"
+RECORDED = "recorded"
+"""torques that were measured or simulated elsewhere"""
 CONTRAST = "contrast"
 """rows that show what happens without the reference's projection; nothing judges them"""
+
 
 SHARE = 0.1
 """A verdict counts only where the reference's uncertainty is below this share of the bound or error that it judges."""

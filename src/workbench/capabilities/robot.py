@@ -75,7 +75,6 @@ class Robot(RobotIdentity):
         raise AttributeError(f"robot {self.__dict__.get('_description') and self.name} has no attribute {name!r}")
 
     # parameters
-
     @cached_property
     def parameters(self) -> Any:
         """The frozen dataclass of parameters, SI."""
@@ -135,7 +134,6 @@ class Robot(RobotIdentity):
         return MujocoReference(self.loaded.file, loaded=self.loaded)
 
     # formulas
-
     @cached_property
     def closed_form(self) -> Any:
         """The robot's kinematics and dynamics in closed form; None where nobody registered any."""

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from workbench.commands.language_templates import LANGUAGES
 from workbench.errors import OutputError, SpecError
 
 MODEL = """<mujoco model="{name}">
@@ -113,29 +114,58 @@ def test_{function}(tmp_path):
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
 
 
+def _number(loops: str) -> int:
+    if not loops.isdigit() or not 1 <= int(loops) <= 20:
+        raise SpecError(f"--loops {loops}; allowed: 1 to 20, or with --from a table of loops")
+    return int(loops)
+
+
+def _from_file(source: Path, directory: Path, loops: str | None, actuated: tuple[str, ...]) -> None:
+    """Write the folder of a robot that a file holds."""
+    from workbench.commands.from_urdf import from_urdf
+    from workbench.commands.import_model import import_model
+
+    if source.suffix.lower() == ".urdf":
+        from_urdf(source, directory, Path(loops) if loops else None, actuated)
+        return
+    if loops is not None:
+        raise SpecError(f"--loops {loops}: {source} is no URDF (.urdf); an MJCF holds its loops itself")
+    import_model(source, directory, actuated)
+
+
 def new(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory to make; its name names the files.")],
     actuated: Annotated[
         list[str] | None, typer.Option(metavar="JOINT", help="A driven joint; may be repeated. Default: crank.")
     ] = None,
     loops: Annotated[
-        int | None, typer.Option(min=1, max=20, help="Closed loops, one driven joint each. Default: one a joint.")
+        str | None,
+        typer.Option(
+            metavar="NUMBER|FILE",
+            help="Closed loops of the sketch, one driven joint each (default: one a joint); with --from, their table.",
+        ),
+    ] = None,
+    language: Annotated[
+        str | None,
+        typer.Option(metavar="octave|c|julia|program", help="The formula in this language too. Default: Python alone."),
     ] = None,
     source: Annotated[
-        Path | None, typer.Option("--from", metavar="FILE", help="A robot's MJCF as it lies, in place of a sketch.")
+        Path | None,
+        typer.Option("--from", metavar="FILE", help="A robot's MJCF as it lies, or its URDF, in place of a sketch."),
     ] = None,
 ) -> None:
     """Write a model with closed loops, its campaign, a formula to fill in and a test; they run at once.
 
     With --from, the robot is a file's: its loops, joints to drive, platform, first guess and a small motion are found.
+    A URDF holds a tree: --loops names the table of its loops (.toml, .yaml).
     """
     if source is not None:
-        from workbench.commands.import_model import import_model
-
-        import_model(source, directory, tuple(actuated or ()))
+        _from_file(source, directory, loops, tuple(actuated or ()))
         return
+    if language is not None and language not in LANGUAGES:
+        raise SpecError(f"--language {language}; allowed: {', '.join(LANGUAGES)}")
     joints = tuple(actuated or ["crank"])
-    count = loops or len(joints)
+    count = _number(loops) if loops else len(joints)
     name = directory.name
     for what, value in (("DIR", name), *(("--actuated", joint) for joint in joints)):
         if not NAME.fullmatch(value):
@@ -172,3 +202,10 @@ def new(
         (directory / file).write_text(text.format(**fields), encoding="utf-8")
     typer.echo(f"{directory}: {name}.xml, {name}.toml, {name}.py, test_{name}.py; now\n  cd {directory}")
     typer.echo(f"  workbench run {name}.toml --candidates {name}.py")
+    if language is not None:
+        pattern, text = LANGUAGES[language]
+        file = pattern.format(name=name)
+        (directory / file).write_text(text.format(**fields), encoding="utf-8")
+        if language == "program":
+            (directory / file).chmod(0o755)
+        typer.echo(f"  workbench run {name}.toml --candidates {'./' if language == 'program' else ''}{file}")

@@ -12,7 +12,7 @@ def report(
     run_dir: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="Directory that a run has written.")],
     format_: Annotated[
         list[str] | None,
-        typer.Option("--format", metavar="html|md|pdf", help="May be repeated. Default: html and md."),
+        typer.Option("--format", metavar="html|md|pdf|csv|mat", help="May be repeated. Default: html and md."),
     ] = None,
     style: Annotated[
         str, typer.Option(metavar="page|paper", help="How figures look: on a page, or in the column of a paper.")
@@ -20,7 +20,8 @@ def report(
 ) -> None:
     """Rebuild the report from what a run has stored; nothing is computed again.
 
-    html: report.html. md: report.md with figures/*.svg. pdf: report.pdf, figures/*.pdf and tables/*.tex.
+    html: report.html. md: report.md with figures/*.svg. pdf: report.pdf, figures/*.pdf and tables/*.tex. csv, mat:
+    data/, for other programs, with units.
     """
     from workbench.console import Steps
     from workbench.report import build_report
@@ -29,5 +30,5 @@ def report(
     with Steps("drawing figures") as show:
         written = build_report(run_dir, formats, style, show)
     for path in written:
-        if path.parent == run_dir:
+        if path.parent in (run_dir, run_dir / "data"):
             typer.echo(str(path))

@@ -31,7 +31,10 @@ def run(
     model: OtherModel = None,
     candidates: Annotated[
         list[str] | None,
-        typer.Option(metavar="FILE", help="Python file with formulas of your own, which is run; may be repeated."),
+        typer.Option(
+            metavar="FILE",
+            help="File with formulas of your own, which is run: .py .m .c .so .jl .R or a program; may be repeated.",
+        ),
     ] = None,
     engines: Annotated[
         str, typer.Option(metavar="LIST", help="mujoco, or mujoco,pinocchio to check the reference by a second engine.")

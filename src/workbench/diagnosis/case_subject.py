@@ -85,8 +85,8 @@ class CaseSubject:
 
     @property
     def source(self) -> Source | None:
-        """The user's file; formulas that come with the package are not edited."""
-        if isinstance(self._function, UserCandidate):
+        """The user's file; those of the package and in other languages are not edited."""
+        if isinstance(self._function, UserCandidate) and self._function.file.suffix == ".py":
             return Source(self._function.file.resolve(), self.candidate)
         return None
 

@@ -133,9 +133,11 @@ def _against(table: Tabulated, doubt: _Doubt) -> str:
 def _way_on(table: Tabulated, doubt: _Doubt) -> str:
     if table.derivatives_given:
         return "correct the columns, or leave all derivatives out so that they follow from the positions"
+    # a campaign's other kind of table estimates derivatives from noisy joint positions and says what that leaves open
+    smoothed = ', or kind = "recorded", which smooths them' if isinstance(table.motion, JointMotion) else ""
     if "samples" in doubt.why:
-        return "give more samples, or velocities and accelerations"
-    return "give velocities and accelerations, or positions and times with all their digits"
+        return f"give more samples, or velocities and accelerations{smoothed}"
+    return f"give velocities and accelerations, or positions and times with all their digits{smoothed}"
 
 
 # --- positions alone --------------------------------------------------------------------------------------------------

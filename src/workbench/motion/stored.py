@@ -13,7 +13,7 @@ from workbench.errors import MotionError
 PARQUET = b"PAR1"
 """How a Parquet file begins."""
 
-_SERIES = re.compile(r"x(d{0,2})\d+|(ref|cand|reaction|point|tau)_.+|closure_residual")
+_SERIES = re.compile(r"x(d{0,2})\d+|(ref|cand|rec|band|part|reaction|point|tau)_.+|closure_residual")
 """Columns of a run's series that are no part of a joint motion (docs/run-directory.md)."""
 
 _MOTION = re.compile(r"t|[qx]d{0,2}\d+")

@@ -174,14 +174,19 @@ class PlatformSide(ABC):
         return {"direct": direct, "inverse": inverse}
 
     def platform_motion(
-        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, coordinates: Sequence[str] = POSITIONS
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        coordinates: Sequence[str] = POSITIONS,
+        along: ArrayLike | None = None,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Task coordinates with their derivatives, each ``(n, m)``, from an actuated motion: forward kinematics.
 
         Any of ``x y z rx ry rz`` may be asked for. Rotations are each sample's least; `task.continuous` joins those of
-        a motion.
+        a motion. *along* as of `inverse_dynamics`.
         """
-        found = self.inverse_dynamics(q, qd, qdd)
+        found = self.inverse_dynamics(q, qd, qdd, along=along)
         position = found.x, found.xd, found.xdd
         return task_motion(task_of(coordinates), position, found.rotation, found.omega, found.alpha)
 

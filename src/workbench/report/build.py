@@ -16,6 +16,7 @@ from markupsafe import Markup, escape
 
 from workbench.errors import OutputError
 from workbench.report.cost import cost_table
+from workbench.report.data_out import DATA_FORMATS, data_files
 from workbench.report.latex import latex_table
 from workbench.report.load import Run, load_run, read_manifest
 from workbench.report.section import Section
@@ -34,7 +35,7 @@ _OWN_TABLE = re.compile(r"[a-z0-9-]+\.tex")
 COLLECT_EVERY = 60
 """Figures between two collections of garbage."""
 
-FORMATS = ("html", "md", "pdf")
+FORMATS = ("html", "md", "pdf", *DATA_FORMATS)
 
 
 Show = Callable[[int, int], None]
@@ -52,7 +53,8 @@ def build_report(
         A run directory with manifest.json, summary.csv and series/, or that of a finished sweep. Nothing is recomputed.
     formats
         ``html``: report.html, one file that loads nothing from elsewhere; ``md``: report.md and the SVG figures that it
-        shows; ``pdf``: report.pdf, each figure as a PDF, and each table as LaTeX in tables/.
+        shows; ``pdf``: report.pdf, each figure as a PDF, and each table as LaTeX in tables/; ``csv`` and ``mat``: the
+        series of each case with units in data/, for other programs.
     style
         ``page``, or ``paper``: figures for the column of a paper.
     show
@@ -82,6 +84,10 @@ def build_report(
         sections = sweep_sections(run)
     with figure_style(style), _few_collections():
         files = _rendered(run, sections, formats, show)
+    wanted = tuple(name for name in formats if name in DATA_FORMATS)
+    if wanted and manifest.sweep is not None:
+        raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; a sweep's data are Parquet")
+    files |= data_files(run_dir, wanted) if wanted else {}
     try:
         for path, content in files.items():
             path.parent.mkdir(exist_ok=True)

@@ -22,6 +22,7 @@ from workbench.report.manifest import CaseRecord
 from workbench.report.mechanism import mechanism_plot
 from workbench.report.pictures import Film
 from workbench.report.plot import Plot
+from workbench.report.recorded import recorded_tables
 from workbench.report.spent import spent_plot, spent_table
 from workbench.report.tables import CASE_STATUS, KINDS, Cell, Status, Table, columns, verdict_status
 from workbench.report.text import error_fraction, exact, percent, pretty_unit, scientific, with_unit
@@ -74,6 +75,7 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None, film: Fil
     rows = run.rows_of_case[case]
     tables = [
         *(_error_table(run, case, kind, [row for row in rows if row.kind == kind], anchor) for kind in KINDS),
+        *recorded_tables(record, anchor),
         kinematics_table(record, anchor),
         *budget_tables(run, case, anchor),
         evidence_table(record, anchor),
@@ -141,6 +143,7 @@ SHOWS = {
     "expected-failure": "Declared failures: formulas that are kept wrong on purpose, against the reference.",
     "modelling": "Modelling error: formulas against a reference that assumes something else, its masses for "
     "instance, so that a real difference is expected.",
+    "recorded": "Measured or simulated elsewhere: recorded torques against the reference on the recorded motion.",
     "contrast": "For contrast: MuJoCo's own mj_inverse, which does not project the loops' constraint forces out.",
 }
 READING = {
@@ -148,6 +151,8 @@ READING = {
     "expected-failure": f"A declared failure has to exceed its bound, every other row has to keep it. {ERRORS_DEFINED}",
     "modelling": "A measured result without a bound, in percent of the reference's own peak, or rms, on that joint; "
     f"the pointwise error leaves out samples below {100 * POINTWISE_FLOOR:g} % of that peak; “left out” counts them.",
+    "recorded": "In percent of the reference's own peak, or rms, on that joint. “Uncertainty” is what the digits and "
+    "the noise of motion and recorder leave open: in 95 % of cases the largest difference that they make is smaller.",
     "contrast": "Nothing judges these rows: they show why the reference projects. In percent of the reference's own "
     "peak, or rms, on that joint.",
 }
@@ -155,13 +160,14 @@ READING = {
 
 def _error_table(run: Run, case: str, kind: str, rows: list[ErrorRow], anchor: str) -> Table:
     bounded = kind in ("verification", "expected-failure")
+    recorded = kind == "recorded"
     doubted = bounded and any(not math.isnan(row.uncertainty) for row in rows)
     scaled = any(row.normaliser != row.peak_reference for row in rows)
     samples = run.manifest.cases[case].samples
     number = error_fraction if bounded else percent
     names = ["Joint", "Candidate", "Reference", "Peak error", "Rms error", "Pointwise error", "Left out", "Worst at"]
     names += ["Peak of reference", *(["Normaliser"] if scaled else []), *(["Bound"] if bounded else [])]
-    names += [*(["Reference's own"] if doubted else []), "Verdict"]
+    names += [*(["Uncertainty"] if recorded else []), *(["Reference's own"] if doubted else []), "Verdict"]
     body = []
     for row in rows:
         total = f" of {samples}" if samples is not None else ""
@@ -180,6 +186,8 @@ def _error_table(run: Run, case: str, kind: str, rows: list[ErrorRow], anchor: s
             cells.append(Cell(with_unit(exact(row.normaliser), row.unit), row.normaliser))
         if bounded:
             cells.append(Cell(exact(row.bound), row.bound))
+        if recorded:
+            cells.append(Cell(percent(row.uncertainty), row.uncertainty))
         if doubted:
             cells.append(Cell(scientific(row.uncertainty), row.uncertainty))
         body.append((*cells, Cell(status=verdict_status(row.verdict))))

@@ -35,6 +35,8 @@ class Curve:
 
     name: str
     is_reference: bool
+    recorded: bool = False
+    """torques from elsewhere, drawn with the band of their uncertainty"""
 
     @classmethod
     def parse(cls, text: str) -> Curve | None:
@@ -44,7 +46,7 @@ class Curve:
 
     def column(self, joint: str) -> str:
         """Name of the series' column."""
-        return f"{'ref' if self.is_reference else 'cand'}_{self.name}_{joint}"
+        return f"{'ref' if self.is_reference else 'rec' if self.recorded else 'cand'}_{self.name}_{joint}"
 
     @property
     def label(self) -> str:
@@ -93,6 +95,11 @@ def torque_lines(axes: Axes, run: Run, series: Series, joint: str, curves: Seque
         values = series.get(curve.column(joint))
         if values is not None:
             axes.plot(time, values, color=PALETTE[index % 6], linestyle=dashes, label=curve.label)
+        band = series.get(f"band_{curve.name}_{joint}") if curve.recorded else None
+        reference = series.get(references[0].column(joint)) if references else None
+        if band is not None and reference is not None:
+            low, high = reference - band, reference + band
+            axes.fill_between(time, low, high, color=PALETTE[index % 6], alpha=0.2, linewidth=0.0)
     step = max(1, len(references) * len(time) // MARKED_SAMPLES)
     for index, curve in enumerate(references):
         values = series.get(curve.column(joint))
@@ -113,7 +120,7 @@ def torque_lines(axes: Axes, run: Run, series: Series, joint: str, curves: Seque
 
 def error_of_row(row: ErrorRow, series: Series, color: str) -> ErrorCurve | None:
     """Return the error behind a row of the summary over time; None where the series does not hold it."""
-    candidate = series.get(Curve(row.candidate, False).column(row.joint))
+    candidate = series.get(Curve(row.candidate, False, row.kind == "recorded").column(row.joint))
     reference = series.get(Curve(row.reference, True).column(row.joint))
     if candidate is None or reference is None or not row.normaliser > 0:
         return None

@@ -51,7 +51,8 @@ def claims_section(run: Run) -> Section | None:
 
 def worst_section(run: Run, anchors: Mapping[str, str]) -> Section:
     """Show the worst verification rows, then declared failures and modelling errors of all cases, largest first."""
-    checked = [row for row in run.rows if row.kind == "verification" or row.verdict in FAILURES]
+    own = [row for row in run.rows if row.kind != "recorded"]
+    checked = [row for row in own if row.kind == "verification" or row.verdict in FAILURES]
     checked.sort(key=lambda row: (row.verdict not in FAILURES, -row.badness))
     tables = [
         _worst_table(run, checked, anchors),
@@ -69,6 +70,14 @@ def worst_section(run: Run, anchors: Mapping[str, str]) -> Section:
             "modelling",
             "Modelling error: how far formulas are from a reference that assumes something else, mostly about masses.",
             "The row's largest in bold, and rows in order of it",
+            percent,
+        ),
+        _by_joint(
+            run,
+            anchors,
+            "recorded",
+            "Measured or simulated elsewhere: recorded torques against the reference.",
+            "What each figure is worth stands in its case's section",
             percent,
         ),
     ]

@@ -105,7 +105,8 @@ def _torque_plot(run: Run, case: str, key: str, series: Series, index: int, rows
     joint = run.manifest.joints[index]
     unit = pretty_unit(run.manifest.force_units[index])
     names = list(dict.fromkeys(row.candidate for row in rows))
-    curves = [Curve(name, False) for name in names]
+    elsewhere = {row.candidate for row in rows if row.kind == "recorded"}
+    curves = [Curve(name, False, name in elsewhere) for name in names]
     curves += [Curve(name, True) for name in dict.fromkeys(row.reference for row in rows)]
     errors = [error_of_row(row, series, PALETTE[names.index(row.candidate) % 6]) for row in rows]
 
@@ -123,7 +124,8 @@ def _torque_plot(run: Run, case: str, key: str, series: Series, index: int, rows
         draw,
         f"Case {case}, joint {joint}: force or torque in {unit} over time of {', '.join(c.label for c in curves)}; "
         f"below, the error relative to the reference's peak on a logarithmic axis. Worst against its bound: "
-        f"{worst.candidate} against the {worst.reference} reference, {scientific(worst.peak_error)}.",
+        f"{worst.candidate} against the {worst.reference} reference, {scientific(worst.peak_error)}."
+        + (" The band around the reference is what a recorded motion leaves open." if elsewhere else ""),
         f"Joint {joint}: force or torque above, error over the reference's peak below",
         key,
     )

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 RATES = {"": "", "d": "/s", "dd": "/s^2"}
 """what a derivative's unit adds to the coordinate's"""
 
-TORQUES = ("ref", "cand")
+TORQUES = ("ref", "cand", "rec", "band")
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class RunFrames:
     def torques(self, case: str) -> pd.DataFrame:
         """Torques of one case, tidy: one row per sample, joint and curve.
 
-        Columns ``t``, ``joint``, ``kind`` (``ref`` or ``cand``), ``name`` (mass model or candidate), ``value``.
+        Columns ``t``, ``joint``, ``kind`` (``ref``, ``cand``, ``rec``), ``name`` (mass model or candidate), ``value``.
 
         Raises
         ------

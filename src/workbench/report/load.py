@@ -137,7 +137,7 @@ def load_run(directory: Path) -> Run:
     for number, row in enumerate(rows, start=2):
         for what, value, valid in (
             ("case", row.case, manifest.cases),
-            ("candidate", row.candidate, manifest.candidates),
+            ("candidate", row.candidate, {*manifest.candidates, *_recorded(manifest, row)}),
             ("joint", row.joint, manifest.joints),
         ):
             if value not in valid:
@@ -179,6 +179,11 @@ REQUIRED_COLUMNS = (
     *("case", "candidate", "reference", "joint", "peak_error", "rms_error", "pointwise_error", "worst_time_s"),
     *("bound", "verdict", "kind", "peak_reference", "unit", "pointwise_skipped"),
 )
+
+
+def _recorded(manifest: Manifest, row: ErrorRow) -> tuple[str, ...]:
+    case = manifest.cases.get(row.case)
+    return tuple(case.recorded) if case and row.kind == "recorded" else ()
 
 
 def _read_summary(path: Path) -> tuple[ErrorRow, ...]:

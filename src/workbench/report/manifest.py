@@ -181,6 +181,56 @@ class DrawingRecord(Record):
     up: tuple[float, float, float]
 
 
+class PartRecord(Record):
+    """One part of a difference, found by regression."""
+
+    name: str
+    value: float | None = None
+    standard_error: float | None = None
+    unit: str = ""
+    share: float | None = None
+    text: str = ""
+
+
+class RecordedJointRecord(Record):
+    """Recorded torques on one joint."""
+
+    verdict: str
+    reason: str = ""
+    peak_error: float | None = None
+    uncertainty: float | None = None
+    torque_noise: float | None = None
+    explained: float | None = None
+    parts: tuple[PartRecord, ...] = ()
+
+
+class SmoothedRecord(Record):
+    """How a recorded coordinate was differentiated."""
+
+    digits: int | None = None
+    noise: float | None = None
+    bandwidth_hz: float | None = None
+    order: int | None = None
+    largest_rate_error: float | None = None
+    largest_acceleration_error: float | None = None
+
+
+class RecordedRecord(Record):
+    """Torques that were measured or simulated elsewhere."""
+
+    file: str
+    description: str = ""
+    reference: str = ""
+    samples: int | None = None
+    compared: int | None = None
+    offset_s: float | None = None
+    offset_error_s: float | None = None
+    notes: tuple[str, ...] = ()
+    sentence: str = ""
+    motion: dict[str, SmoothedRecord] = Field(default_factory=dict)
+    joints: dict[str, RecordedJointRecord] = Field(default_factory=dict)
+
+
 class SpentRecord(Record):
     """What a case's torques are spent on: root mean squares, N or N m, by part and by body, joint by joint."""
 
@@ -233,6 +283,7 @@ class CaseRecord(Record):
     solutions_at_start: tuple[tuple[float | None, ...], ...] = ()
     evidence: EvidenceRecord = EvidenceRecord()
     drawing: DrawingRecord | None = None
+    recorded: dict[str, RecordedRecord] = Field(default_factory=dict)
     spent: SpentRecord = SpentRecord()
     kinematics_checks: tuple[KinematicsRecord, ...] = ()
     warnings: tuple[str, ...] = ()

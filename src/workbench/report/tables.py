@@ -50,12 +50,14 @@ VERDICT_STATUS = {
     "expected-fail": EXPECTED_FAIL,
     "unexpected-pass": UNEXPECTED_PASS,
     "undecided": UNDECIDED_VERDICT,
+    "agrees": Status("passed", "≈", "agrees within its uncertainty"),
+    "differs": Status("measured", "≠", "differs"),
 }
 FAILURES = frozenset({"fail", "unexpected-pass", "undecided"})
 """Verdicts that fail a campaign."""
 CHECKED = frozenset({"pass", "fail", "undecided"})
 """Verdicts of rows that have a bound to keep."""
-KINDS = ("verification", "expected-failure", "modelling", "contrast")
+KINDS = ("verification", "expected-failure", "modelling", "recorded", "contrast")
 """Families of rows, which a table never mixes."""
 
 CLAIM_STATUS = {True: HOLDS, False: REFUTED, None: UNDECIDED}

@@ -1,0 +1,1 @@
+"""Formulas in other languages: Octave and MATLAB files, C, and any program, each in a process of its own."""

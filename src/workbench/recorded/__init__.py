@@ -1,0 +1,1 @@
+"""Torques that were measured or simulated elsewhere: reading them, what their motion is worth, where they differ."""
