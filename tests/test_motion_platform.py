@@ -176,7 +176,7 @@ def test_a_campaign_drives_the_platform_by_sines_and_tables(tmp_path: Path) -> N
     # beyond its samples the motion goes on as its formula says
     q = course_of(cases[0])(np.array([1.5]))[0]
     np.testing.assert_allclose(
-        cases[0].mechanism.forward_kinematics(q),
+        cases[0].robot.forward_kinematics(q),
         platform_sine([1.5], [0, 0.02, 0.34], [0.03, 0.02, 0.03], [3, 4, 5], [0, 1, 2]).x,
         atol=1e-12,
     )
