@@ -280,3 +280,9 @@ def test_model_check_of_an_own_mechanism_takes_what_the_campaign_says(workbench:
     )
     assert locked.code == 1
     assert "the loops leave no freedom" in locked.out
+
+
+def test_a_model_in_millimetres_is_noticed(workbench: Workbench) -> None:
+    assert "millimetres" not in run(workbench, None).out
+    workbench.write(FOURBAR.replace('name="coupler" pos="0.2 0 0.05"', 'name="coupler" pos="200 0 50"'), "fourbar.xml")
+    assert 'site "coupler" lies 206.155 m from where it hangs' in " ".join(run(workbench, None).out.split())

@@ -339,7 +339,7 @@ def test_every_case_of_the_campaigns(repository: Path, name: str) -> None:
     campaign, file = load_campaign(repository / "campaigns" / f"{name}.toml")
     for case in resolve_cases(campaign, file):
         reference = wb.MujocoReference(case.model, **case.overrides)
-        motion, mechanism, force = case.motion, case.mechanism, case.force[0]
+        motion, mechanism, force = case.motion, case.robot, case.force[0]
         for mass_model in ("distributed", "lumped"):
             balance = power_balance(reference, motion.q, motion.qd, motion.qdd, mass_model, force)
             assert balance.relative < 1e-11, (case.name, mass_model)

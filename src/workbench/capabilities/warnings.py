@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
@@ -55,6 +56,7 @@ def reference_warnings(robot: Robot, qd: FloatArray | None) -> list[str]:
     if qd is not None and not reference.excess_actuators:
         dry = np.asarray(model.dof_frictionloss)[structure.actuated]
         found += DriveFriction(robot.joints, 0.0 * dry, dry, 0.0 * dry).warnings(qd)
+    found += _far_away(model)
     if reference.excess_actuators:
         freedoms = len(robot.joints) - reference.excess_actuators
         found.append(
@@ -73,6 +75,21 @@ def reference_warnings(robot: Robot, qd: FloatArray | None) -> list[str]:
                 " its own axis; the reference holds that spin at zero, by a moment that no actuator gives"
             )
     return found
+
+
+def _far_away(model: mujoco.MjModel) -> list[str]:
+    """A body or site that lies so far from its parent that the file was most likely drawn in millimetres."""
+    obj = mujoco.mjtObj
+    for what, kind, places in (("body", obj.mjOBJ_BODY, model.body_pos), ("site", obj.mjOBJ_SITE, model.site_pos)):
+        far = np.linalg.norm(places, axis=1)
+        if len(far) and far.max() > LONGEST_LINK:
+            worst = int(far.argmax())
+            name = mujoco.mj_id2name(model, kind, worst) or f"#{worst}"
+            return [
+                f'{what} "{name}" lies {far[worst]:g} m from where it hangs, more than {LONGEST_LINK:g} m:'
+                " an MJCF is in metres, this looks like millimetres"
+            ]
+    return []
 
 
 def refuse_degrees(robot: Robot, q: FloatArray) -> None:
