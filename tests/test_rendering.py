@@ -115,7 +115,10 @@ def test_a_broken_model_can_be_looked_at(tmp_path: Path) -> None:
         (("--out", "x.png", "--campaign", "gone.toml"), "gone.toml: no such campaign file"),
         (("--out", "x.png", "--campaign", "small.toml", "--case", "frist"), 'no case "frist"; did you mean "first"?'),
         (("--out", "x.gif", "--campaign", "small.toml", "--stop", "9"), "0 to 9 s; allowed: a part of 0 to 1 s"),
-        (("--out", "x.gif", "--campaign", "small.toml", "--speed", "1e-6"), "frames; allowed: at most 6000"),
+        (
+            ("--out", "x.gif", "--campaign", "small.toml", "--speed", "1e-6"),
+            "--speed 1e-06; allowed: a positive number, 0.0001 to 10000",
+        ),
         ((), "Missing option '--out'"),
     ],
 )

@@ -43,7 +43,8 @@ def _smaller(picture: np.ndarray) -> Image.Image:
 
 def _end_with_parent() -> None:
     """Wait for the end of the standard input, which the run that began this process holds open, and end."""
-    sys.stdin.buffer.read()
+    while os.read(0, 4096):  # not sys.stdin: its lock, held here, aborts the interpreter when it ends
+        pass
     os._exit(0)
 
 
