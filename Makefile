@@ -19,7 +19,7 @@ PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_model
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow test-browser test-floors reports bench lint format clean
+.PHONY: help setup run test test-slow test-long test-browser test-floors reports bench lint format clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -54,10 +54,13 @@ run: $(STAMP) ## Run the campaign of the 2010 paper (CAMPAIGN=... for another)
 	@$(BIN)/workbench run $(CAMPAIGN)
 
 test: lint ## Check style and types, then run the tests (SLOW=1: all of them)
-	$(BIN)/pytest -n 2 --dist worksteal $(if $(SLOW),-m "slow or not slow") $(PYTEST_ARGS)
+	$(BIN)/pytest -n 2 --dist worksteal $(if $(SLOW),-m "(slow or not slow) and not long") $(PYTEST_ARGS)
 
 test-slow: $(STAMP) ## Run only the tests marked slow
 	$(BIN)/pytest -m slow $(PYTEST_ARGS)
+
+test-long: $(STAMP) ## Run the tests that take many minutes, by hand: all bad inputs, all commands among planted files
+	$(BIN)/pytest -m long $(PYTEST_ARGS)
 
 test-browser: $(STAMP) ## Run the tests that open a report in Chromium
 	$(BIN)/pytest -n 2 -m browser $(PYTEST_ARGS)

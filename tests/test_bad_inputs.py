@@ -82,7 +82,7 @@ def test_one_in_so_many_gives_one_line(table: list[Bad], good: Path, tmp_path: P
     assert faults(table[::EVERY], good, tmp_path) == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_each_gives_one_line(table: list[Bad], good: Path, tmp_path: Path) -> None:
     assert faults([case for n, case in enumerate(table) if n % EVERY], good, tmp_path) == []
 

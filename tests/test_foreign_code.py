@@ -134,7 +134,7 @@ def test_runs_and_sweeps_run_nothing_that_lies_in_their_directory(trapped: Path)
     obey(trapped, QUICKLY)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_no_command_runs_what_lies_in_its_directory(trapped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)  # a viewer would wait for somebody to close it
     obey(trapped, COMMANDS)
