@@ -225,7 +225,7 @@ def test_an_edit_that_mends_everything_scores_complete(repository: Path, tmp_pat
     assert len(lines) > 20
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_search_finds_the_lost_factor(repository: Path, tmp_path: Path) -> None:
     campaign, path = spoiled(repository, tmp_path, "delta", "+ p.ma / 2 * (tangent", "- p.ma / 2 * (tangent")
     subject = subjects(campaign, candidates=[path], candidate="exact")[0]

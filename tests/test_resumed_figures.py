@@ -12,7 +12,7 @@ import pytest
 from small_campaign import CANDIDATES, CASES, HEAD
 from sweep_campaign import SWEEP
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("warm_kernels")]
+pytestmark = [pytest.mark.long, pytest.mark.usefixtures("warm_kernels")]
 
 COMMAND = (sys.executable, "-P", "-m", "workbench", "run", "c.toml", "--quick", "--no-pictures")
 

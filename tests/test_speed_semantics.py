@@ -350,7 +350,8 @@ def read_only_package(tmp_path: Path) -> Path:
     """A copy of the package that cannot hold caches: a file stands where their directories would be."""
     package = tmp_path / "site" / "workbench"
     shutil.copytree(REPOSITORY / "src" / "workbench", package, ignore=shutil.ignore_patterns("__pycache__"))
-    for directory in [package, *(path for path in package.iterdir() if path.is_dir())]:
+    shutil.copytree(REPOSITORY / "models", package / "data" / "models")
+    for directory in [package, *(path for path in package.rglob("*") if path.is_dir())]:
         (directory / "__pycache__").write_text("not a directory")
     return package
 
