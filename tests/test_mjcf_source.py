@@ -14,6 +14,7 @@ from workbench.errors import ModelError
 from workbench.mjcf.files import MAX_ASSET
 from workbench.mjcf.prepared import Prepared, open_source
 from workbench.mjcf.source import read_source
+from workbench.robots import load
 
 TETRA = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 LARGER = TETRA.replace(b"1 0 0", b"3 0 0")
@@ -247,3 +248,19 @@ def test_a_text_without_a_folder_reads_nothing(tmp_path: Path, monkeypatch: pyte
     assert source.assets == {}
     with pytest.raises(ModelError, match="lies in no folder"):
         read_source('<mujoco><include file="i.xml"/></mujoco>', "m", None)
+
+
+@pytest.mark.parametrize("name", ["asym_2rss_ppap", "planar_4rprp"])
+def test_a_model_that_names_no_other_file_is_read_once(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    load.load_model(name, {"g": 9.5})
+    monkeypatch.setattr(load, "_read", lambda *_: pytest.fail("read again"))
+    assert load.load_model(name, {"g": 9.6}).values["g"] == 9.6  # type: ignore[index]
+
+
+def test_a_model_with_an_include_is_read_again(tmp_path: Path) -> None:
+    model, part = tmp_path / "model.xml", tmp_path / "part.xml"
+    model.write_text('<mujoco><include file="part.xml"/></mujoco>')
+    for mass in (1.0, 2.0):
+        body = f'<body><joint/><geom size="1" mass="{mass}"/></body>'
+        part.write_text(f"<mujocoinclude><worldbody>{body}</worldbody></mujocoinclude>")
+        assert load.load_model(model).model.body_mass[1] == mass

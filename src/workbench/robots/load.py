@@ -30,7 +30,8 @@ from workbench.robots.parameters import Target
 from workbench.robots.robot_file import RobotFile
 from workbench.robots.values import is_written, quotient, read_number, read_parameters, rewrite
 
-NAMES_FILES = re.compile(r"\b(file|\w*dir)\s*=")
+NAMES_FILES = re.compile(r"\bfile\s*=")
+"""Of an include, a mesh, a picture, an attached model: a text with it may mean something else when it is read again."""
 
 
 @dataclass(frozen=True)
