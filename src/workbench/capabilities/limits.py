@@ -56,29 +56,10 @@ def reach_box(robot: Robot) -> tuple[FloatArray, FloatArray]:
 
     low, high = np.array(robot.joint_limits).T
     probes = low + (high - low) * qmc.Sobol(len(low), rng=np.random.default_rng(0)).random(PROBES)
-    probes = probes[robot.reference.assemblable(probes)]
-    if not len(probes):
+    points = robot.reference.reached_places(probes, robot.coordinates)
+    if not len(points):
         raise MotionError(
             f"{robot.name}: no pose within the joints' limits can be assembled; give limits in the robot file"
         )
-    points = _reached(robot, probes)
     wide = MARGIN * np.ptp(points, axis=0)
     return points.min(axis=0) - wide, points.max(axis=0) + wide
-
-
-def _reached(robot: Robot, probes: FloatArray) -> FloatArray:
-    """Task coordinates of the probes; one that can be assembled and still not be followed from home is left out.
-
-    Raises
-    ------
-    MotionError
-        None of them can be followed.
-    """
-    while True:
-        try:
-            return robot.forward_kinematics(probes)
-        except MotionError as error:
-            sample = error.facts.get("sample")
-            if sample is None or len(probes) == 1:
-                raise
-            probes = np.delete(probes, int(sample), axis=0)

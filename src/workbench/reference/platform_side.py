@@ -137,12 +137,17 @@ class PlatformSide(ABC):
         q[~reachable] = np.nan
         return PlatformReach(q, reachable, measures, np.where(reachable, found.condition, np.nan))
 
-    def assemblable(self, q: ArrayLike) -> np.ndarray:
-        """Which of some actuated coordinates ``(n, na)`` a straight way from home leads to, past no singular pose."""
+    def reached_places(self, q: ArrayLike, coordinates: Sequence[str] = POSITIONS) -> FloatArray:
+        """Task coordinates ``(k, m)`` of those actuated coordinates ``(n, na)`` that a way from home leads to.
+
+        The way is straight, from home or from another one of the batch, and passes no singular pose.
+        """
+        closer = self._platform_closer(coordinates)
         leader, columns = self.determining
-        return leader._closer.mark(
-            np.ascontiguousarray(as_batch("q", q, len(self._closer.structure.actuated))[:, columns])
-        )[1]
+        q = as_batch("q", q, len(closer.structure.actuated))
+        found, reached = leader._closer.mark(np.ascontiguousarray(q[:, columns]))
+        qpos = found.qpos[reached]
+        return closer.coordinates(qpos, np.zeros((len(qpos), len(closer.task.names))))
 
     def jacobian(self, q: ArrayLike, coordinates: Sequence[str] = POSITIONS) -> FloatArray:
         """Platform Jacobian ``(n, m, na)``, xd = J qd, at actuated coordinates ``(n, na)``.
