@@ -78,6 +78,27 @@ def velocities(tangent, qd, qvel):  # type: ignore[no-untyped-def]
         _along(tangent[s], qd[s], qvel[s])
 
 
+@inlined
+def keep_if_better(res, limits, qpos, kept, best, s):  # type: ignore[no-untyped-def]
+    """Judge a sample by its residuals ``(m,)``: into ``kept (nq,)`` and ``best[s]`` goes what is better than before.
+
+    Returns whether it needs another step, and whether it is better and closed; ``limits`` as of `newton_step`.
+    """
+    closed, floor, astray, settles = limits
+    worst = 0.0
+    for i in range(res.shape[0]):
+        worst = max(worst, abs(res[i]))
+        if math.isnan(res[i]):
+            worst = math.inf
+    better = worst < best[s] or (settles and worst < astray)
+    again = floor < worst < astray and (worst <= best[s] or settles)
+    if better:
+        best[s] = worst
+        for k in range(qpos.shape[0]):
+            kept[k] = qpos[k]
+    return again, better and worst <= closed
+
+
 @compiled
 def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, tangent, rank, condition, weakest):  # type: ignore[no-untyped-def]
     """One Newton step on the passive joints of the listed samples; returns those that need another, as a new list.
@@ -90,7 +111,6 @@ def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, t
     """
     cdof, com, site_xpos, site_xquat, anchors = poses
     passive, actuated = split
-    closed, floor, astray, settles = limits
     m, nv, p, na = closures.block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
     # columns side by side in memory: the factor works along them
@@ -101,24 +121,14 @@ def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, t
     for n in range(ids.shape[0]):
         s = ids[n]
         constraint_rows(closures, joints, qpos[s], cdof[s], com[s], site_xpos[s], site_xquat[s], anchors[s], jac, res)
-        worst = 0.0
-        for i in range(m):
-            worst = max(worst, abs(res[i]))
-            if math.isnan(res[i]):
-                worst = math.inf
-        better = worst < best[s] or (settles and worst < astray)
-        again = floor < worst < astray and (worst <= best[s] or settles)
-        if better:
-            best[s] = worst
-            for k in range(qpos.shape[1]):
-                kept[s, k] = qpos[s, k]
-        if not (again or (better and worst <= closed)):
+        again, good = keep_if_better(res, limits, qpos[s], kept[s], best, s)
+        if not (again or good):
             continue
         for i in range(m):
             for j in range(p):
                 a[i, j] = jac[i, passive[j]]
         found = factor(a, beta, perm)
-        if better and worst <= closed:
+        if good:
             for j in range(na):
                 for i in range(m):
                     rhs[i] = -jac[i, actuated[j]]

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from workbench.compiled import compiled
-from workbench.reference.kernels import integrate
+from workbench.reference.kernels import integrate, keep_if_better
 from workbench.reference.linear import factor, solve
 from workbench.reference.rows import acceleration_rows, body_motion, constraint_rows
 from workbench.reference.task_rows import task_acceleration, task_rows
@@ -27,7 +27,6 @@ def platform_newton(  # type: ignore[no-untyped-def]
     the task coordinates.
     """
     cdof, com, site_xpos, site_xquat, anchors = poses
-    closed, floor, astray, settles = limits
     block_rows, root, moving, depth = closures.block_rows, closures.root, closures.moving, closures.depth
     loops, nv, given = block_rows[-1], cdof.shape[1], aim.shape[1]
     m = loops + given
@@ -46,24 +45,14 @@ def platform_newton(  # type: ignore[no-untyped-def]
         )  # fmt: skip
         for i in range(given):
             res[loops + i] = values[i] - aim[s, i]
-        worst = 0.0
-        for i in range(m):
-            worst = max(worst, abs(res[i]))
-            if math.isnan(res[i]):
-                worst = math.inf
-        better = worst < best[s] or (settles and worst < astray)
-        again = floor < worst < astray and (worst <= best[s] or settles)
-        if better:
-            best[s] = worst
-            for k in range(qpos.shape[1]):
-                kept[s, k] = qpos[s, k]
-        if not (again or (better and worst <= closed)):
+        again, good = keep_if_better(res, limits, qpos[s], kept[s], best, s)
+        if not (again or good):
             continue
         for i in range(m):
             for j in range(nv):
                 a[i, j] = jac[i, j]
         found = factor(a, beta, perm)
-        if better and worst <= closed:
+        if good:
             for j in range(given):
                 for i in range(m):
                     rhs[i] = 0.0
