@@ -109,12 +109,13 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
             results[mass_model] = reference.inverse_dynamics(
                 motion.q, motion.qd, motion.qdd, mass_model, case.force, along=motion.t
             )
-        computed = torques_of(case, dict.fromkeys(c.name for c in campaign.candidate))
+        first = next(iter(results.values()))
+        computed = torques_of(case, dict.fromkeys(c.name for c in campaign.candidate), first)
         torques = computed.torques
     except MotionError as error:
         raise at_time(error, motion.t) from error
-    left = _left_out(case, reference, next(iter(results.values())))
-    platform = platform_of(case, next(iter(results.values())))
+    left = _left_out(case, reference, first)
+    platform = platform_of(case, first)
     series |= platform.columns()
     if robot.closed_kinematics:  # else the case's platform motion is the reference's own
         _refuse_other_branch(case, platform.task[0])
@@ -139,7 +140,6 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     for found in recorded:
         series |= _columns(f"rec_{found.spec.label}", found.tau, robot.joints)
         series |= _columns(f"band_{found.spec.label}", found.band, robot.joints)
-    first = next(iter(results.values()))
     for joint, force in first.reactions.items():
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual

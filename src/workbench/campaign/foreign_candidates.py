@@ -79,7 +79,7 @@ class ForeignCandidate(UserCandidate):
         qd: FloatArray,
         qdd: FloatArray,
         force: FloatArray,
-        t: FloatArray | None = None,
+        known: Mapping[str, FloatArray] | None = None,
     ) -> FloatArray:
         """Call the formula.
 

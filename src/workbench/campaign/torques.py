@@ -12,6 +12,7 @@ from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case
 from workbench.campaign.user_candidates import SLOW_S, UserCandidate
 from workbench.errors import ArrayError, CandidateError
+from workbench.reference import ReferenceResult
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ class Computed:
         return noted
 
 
-def torques_of(case: Case, names: Iterable[str]) -> Computed:
-    """Compute the torques of the named candidates.
+def torques_of(case: Case, names: Iterable[str], result: ReferenceResult) -> Computed:
+    """Compute the torques of the named candidates; *result* is the reference's, for the platform's motion.
 
     Raises
     ------
@@ -63,11 +64,12 @@ def torques_of(case: Case, names: Iterable[str]) -> Computed:
         A built-in candidate returns the wrong shape.
     """
     computed, motion, robot = Computed(), case.motion, case.robot
+    known = vars(result) | {"t": motion.t}
     for name in names:
         function = robot.candidates[name].function
         try:
-            time = {"t": motion.t} if isinstance(function, UserCandidate) else {}
-            tau = function(robot, motion.q, motion.qd, motion.qdd, case.force, **time)
+            told = {"known": known} if isinstance(function, UserCandidate) else {}
+            tau = function(robot, motion.q, motion.qd, motion.qdd, case.force, **told)
         except CandidateError as error:
             computed.faults[name] = Fault(str(error), "sample" in error.facts)
             tau = np.full_like(motion.q, np.nan)

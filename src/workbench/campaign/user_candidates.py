@@ -104,9 +104,9 @@ class UserCandidate:
         qd: FloatArray,
         qdd: FloatArray,
         force: FloatArray,
-        t: FloatArray | None = None,
+        known: Mapping[str, FloatArray] | None = None,
     ) -> FloatArray:
-        """Call the function; *t* ``(n,)`` says that the samples are a motion.
+        """Call the function; *known* is the time and the platform's motion at the samples, where they are a motion.
 
         Raises
         ------
@@ -114,7 +114,7 @@ class UserCandidate:
             It raised, took too long, or returned something that is no finite array ``(n, na)``; with file and line.
         """
         given = (q, qd, qdd, force) if self._wants.force else (q, qd, qdd)
-        return self._called(robot, given, self._motion(robot, q, qd, qdd, t), q.shape, robot.joints)
+        return self._called(robot, given, self._motion(robot, q, qd, qdd, known), q.shape, robot.joints)
 
     def kinematics(self, robot: Robot, given: FloatArray, expected: FloatArray) -> FloatArray:
         """Call a kinematics function with q or x; the result has the shape of *expected*.
@@ -128,18 +128,15 @@ class UserCandidate:
         return self._called(robot, (given,), {}, expected.shape, columns)
 
     def _motion(
-        self, robot: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, t: FloatArray | None
+        self, robot: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray, known: Mapping[str, FloatArray] | None
     ) -> dict[str, FloatArray]:
-        """What the function asks for by argument name, from the reference."""
+        """What the function asks for by argument name; the platform's motion from the reference."""
         wanted = self._wants.motion
-        if not wanted:
-            return {}
-        if t is None and "t" in wanted:
-            raise self._fault("asks for the time t, and these samples are no motion")
-        if wanted == ("t",):
-            return {"t": t}  # type: ignore[dict-item]
-        result = robot.reference.inverse_dynamics(q, qd, qdd, along=t)
-        return {name: t if name == "t" else getattr(result, name) for name in wanted}  # type: ignore[misc]
+        if wanted and known is None:
+            if self.needs_time:
+                raise self._fault("asks for the time t, and these samples are no motion")
+            known = vars(robot.reference.inverse_dynamics(q, qd, qdd))
+        return {name: known[name] for name in wanted} if known else {}
 
     def _called(
         self,
