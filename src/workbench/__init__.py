@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from workbench.report.live import run
     from workbench.robots.registration import (
         candidate,
-        closed_form,
         forward_kinematics,
         inverse_kinematics,
         jacobian,
@@ -38,7 +37,6 @@ __all__ = [
     "WorkbenchError",
     "__version__",
     "candidate",
-    "closed_form",
     "diagnose",
     "forward_kinematics",
     "inverse_kinematics",
@@ -54,7 +52,6 @@ _HOMES = {
     "MujocoReference": "workbench.reference",
     "WorkbenchError": "workbench.errors",
     "candidate": "workbench.robots.registration",
-    "closed_form": "workbench.robots.registration",
     "forward_kinematics": "workbench.robots.registration",
     "inverse_kinematics": "workbench.robots.registration",
     "jacobian": "workbench.robots.registration",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations, combinations_with_replacement
+from itertools import combinations
 
 import numpy as np
 
@@ -132,8 +132,3 @@ def _remainder(plan: Plan, at: dict[tuple[str | int, ...], FloatArray], parts: P
         gap = at[label] - total
         worst = np.where(np.abs(gap) > np.abs(worst), gap, worst)
     return worst
-
-
-def velocity_pairs(na: int) -> list[tuple[int, int]]:
-    """Joints of all velocity products."""
-    return list(combinations_with_replacement(range(na), 2))

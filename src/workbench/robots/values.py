@@ -20,7 +20,6 @@ from workbench.mjcf.text import (
     PLAIN_DIGITS,
     Edit,
     Element,
-    element_label,
     replace_numbers,
     significant_digits,
     tokens,
@@ -267,8 +266,3 @@ def _only_component(numbers: FloatArray, target: Target, file: str) -> tuple[int
             file=file,
         )
     return index, 1.0 if numbers[index] > 0 else -1.0
-
-
-def target_label(target: Target) -> str:
-    """How messages speak of the element of a target."""
-    return element_label(target.element, target.name)
