@@ -13,7 +13,7 @@ from matplotlib.collections import PolyCollection
 from test_report import JOINTS, make_run
 from workbench.report import build_report
 from workbench.report.load import Run, load_run
-from workbench.report.spent import PARTS, spent_plot, spent_table
+from workbench.report.spent import PARTS, corners, spent_plot, spent_table
 from workbench.report.style import figure_style
 from workbench.report.svg import new_figure
 
@@ -84,3 +84,17 @@ def test_the_report_shows_figure_and_table(run: Run) -> None:
     assert "<arm>" not in page
     assert (run.directory / "figures" / "case-sim1-spent.svg").is_file()
     assert json.loads((run.directory / "manifest.json").read_text())["cases"]["sim1"]["spent"]["bodies"]
+
+
+def test_thinned_edges_stay_within_their_tolerance() -> None:
+    rng = np.random.default_rng(4)
+    time = np.cumsum(rng.uniform(0.5, 1.5, 2000))
+    curves = np.array([np.sin(time / 50), np.cos(time / 31) + (time > 1000), 0.01 * np.sin(time)])
+    for off in (0.02, 0.002):
+        rows = corners(time, curves, off)
+        drawn = np.array([np.interp(time, time[rows], curve[rows]) for curve in curves])
+        assert np.abs(drawn - curves).max() <= off
+        assert len(rows) < 2000
+        fewer = np.array([np.interp(time, time[rows[::2]], curve[rows[::2]]) for curve in curves])
+        assert np.abs(fewer - curves).max() > off  # the twin: half of the corners do not do
+    assert corners(time[:1], curves[:, :1], 0.1).tolist() == [0]
