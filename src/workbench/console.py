@@ -61,46 +61,11 @@ STYLES = {
 """Colour of each verdict; a row of the table shows the first of them that one of its joints has."""
 
 
-class CaseProgress:
-    """A progress bar on a terminal, one plain line per case elsewhere."""
-
-    def __init__(self) -> None:
-        self._bar = Progress(
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-            console=err, transient=True, disable=not err.is_terminal,
-        )  # fmt: skip
-        self._task: Any = None
-
-    def __enter__(self) -> Self:
-        """Start the bar."""
-        self._bar.start()
-        self._task = self._bar.add_task("preparing", total=None)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Take the bar away."""
-        self._bar.stop()
-
-    def __call__(self, case: str, number: int, total: int) -> None:
-        """Show that a case begins; an empty name means that the report is being written."""
-        label = escape(case) if case else "writing the report"
-        if err.is_terminal:
-            self._bar.update(self._task, description=label, completed=number, total=total)
-        elif case:
-            err.print(f"[{number + 1}/{total}] {case}", markup=False)
-
-
-class Steps:
-    """Steps of something that may take a while: a bar on a terminal, a line now and then elsewhere.
-
-    *what* is said beside it: ``drawing figures``.
-    """
+class _Bar:
+    """A progress bar on a terminal; nothing of it elsewhere."""
 
     def __init__(self, what: str) -> None:
         self._what = what
-        self._said = time.monotonic()
         self._bar = Progress(
             TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
             console=err, transient=True, disable=not err.is_terminal,
@@ -118,6 +83,32 @@ class Steps:
     ) -> None:
         """Take the bar away."""
         self._bar.stop()
+
+
+class CaseProgress(_Bar):
+    """A progress bar on a terminal, one plain line per case elsewhere."""
+
+    def __init__(self) -> None:
+        super().__init__("preparing")
+
+    def __call__(self, case: str, number: int, total: int) -> None:
+        """Show that a case begins; an empty name means that the report is being written."""
+        label = escape(case) if case else "writing the report"
+        if err.is_terminal:
+            self._bar.update(self._task, description=label, completed=number, total=total)
+        elif case:
+            err.print(f"[{number + 1}/{total}] {case}", markup=False)
+
+
+class Steps(_Bar):
+    """Steps of something that may take a while: a bar on a terminal, a line now and then elsewhere.
+
+    *what* is said beside it: ``drawing figures``.
+    """
+
+    def __init__(self, what: str) -> None:
+        super().__init__(what)
+        self._said = time.monotonic()
 
     def __call__(self, done: int, total: int) -> None:
         """Show that so many steps are done."""
