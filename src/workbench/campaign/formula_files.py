@@ -41,9 +41,14 @@ class Siblings:
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
-        self.files: set[Path] = set()
+        self._origins: set[str] = set()
         self._modules: dict[str, ModuleType] = {}
         self._lock = threading.RLock()
+
+    @property
+    def files(self) -> set[Path]:
+        """Files of the directory that were imported."""
+        return {Path(origin) for origin in self._origins}
 
     @contextmanager
     def visible(self) -> Iterator[None]:
@@ -56,7 +61,8 @@ class Siblings:
                 yield
             finally:
                 sys.meta_path.remove(self)
-                for name, module in list(sys.modules.items()):
+                # every call of a formula ends here: most have no neighbours, and thousands of modules are loaded
+                for name, module in list(sys.modules.items()) if self._origins else ():
                     if self._is_ours(getattr(module, "__file__", None)):
                         self._modules[name] = module
                         sys.modules.pop(name, None)
@@ -70,13 +76,13 @@ class Siblings:
             return None
         spec = PathFinder.find_spec(fullname, [str(self.directory)])
         if spec is not None and isinstance(spec.loader, SourceFileLoader) and spec.origin:
-            self.files.add(Path(spec.origin))
+            self._origins.add(spec.origin)
             spec.loader = _Uncached(spec.loader.name, spec.loader.path)
             return spec
         return None
 
     def _is_ours(self, file: object) -> bool:
-        return isinstance(file, str) and Path(file) in self.files
+        return isinstance(file, str) and file in self._origins
 
     def _asked_from_here(self) -> bool:
         frame = sys._getframe(1)
