@@ -66,6 +66,14 @@ def summary(directory: Path) -> dict[str, Any]:
     return found
 
 
+def test_a_slow_formula_is_no_warning_that_a_sweep_stores(workbench: Workbench) -> None:
+    """Whether a call took long depends on the machine's load; one such count made two equal sweeps differ."""
+    workbench.write(FORMULA.replace("return", "__import__('time').sleep(0.2)\n    return"), "mine.py")
+    workbench.write(SWEEP.replace("samples = 16", "samples = 2"), "sweep.toml")
+    assert workbench("run", "sweep.toml", "--candidates", "mine.py", "--out", "out", "--jobs", "1").code == 0
+    assert (pd.read_parquet(workbench.directory / "out" / "cases")["warnings"] == 0).all()
+
+
 def test_any_number_of_workers_gives_the_same_bytes(workbench: Workbench) -> None:
     workbench.write(FORMULA, "mine.py")
     for jobs in ("1", "2"):

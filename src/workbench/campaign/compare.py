@@ -110,7 +110,8 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
                 motion.q, motion.qd, motion.qdd, mass_model, case.force, along=motion.t
             )
         first = next(iter(results.values()))
-        computed = torques_of(case, dict.fromkeys(c.name for c in campaign.candidate), first)
+        names = dict.fromkeys(c.name for c in campaign.candidate)
+        computed = torques_of(case, names, first, timed=effort.timed)
         torques = computed.torques
     except MotionError as error:
         raise at_time(error, motion.t) from error

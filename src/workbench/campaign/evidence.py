@@ -37,6 +37,8 @@ class Effort:
     """power balance, forward replay and the row of raw `mj_inverse`"""
     drawing: bool = True
     """the robot's points over time, for drawings of it"""
+    timed: bool = True
+    """a slow formula is warned of; not where warnings are stored as numbers, which must not depend on the clock"""
 
 
 FULL = Effort()

@@ -53,8 +53,10 @@ class Computed:
         return noted
 
 
-def torques_of(case: Case, names: Iterable[str], result: ReferenceResult) -> Computed:
+def torques_of(case: Case, names: Iterable[str], result: ReferenceResult, *, timed: bool = True) -> Computed:
     """Compute the torques of the named candidates; *result* is the reference's, for the platform's motion.
+
+    A slow candidate is warned of if *timed*: a sweep counts warnings, and what it stores must not depend on the clock.
 
     Raises
     ------
@@ -75,7 +77,7 @@ def torques_of(case: Case, names: Iterable[str], result: ReferenceResult) -> Com
             tau = np.full_like(motion.q, np.nan)
         if tau.shape != motion.q.shape:
             raise ArrayError(f'candidate "{name}": expected tau of shape {motion.q.shape}, got {tau.shape}')
-        if isinstance(function, UserCandidate) and function.seconds_per_sample > SLOW_S:
+        if timed and isinstance(function, UserCandidate) and function.seconds_per_sample > SLOW_S:
             computed.warnings.append(
                 f'candidate "{name}" ({function.where}) is slow: {1e3 * function.seconds_per_sample:.3g} ms a sample'
             )
