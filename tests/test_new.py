@@ -32,6 +32,22 @@ def test_what_it_writes_runs_at_once(workbench: Workbench, joints: tuple[str, ..
     assert 0 < run.summary["peak_error"].max() < 10
 
 
+def test_its_robot_has_parameters_and_stays_whole_when_one_is_set(workbench: Workbench) -> None:
+    assert workbench("new", "mine", "--actuated", "left", "--actuated", "right").code == 0
+    done = workbench("model", "set", "mine", "b=0.5", "--out", "mine/long.xml")
+    assert done.code == 0, done.err
+    changed = Path("mine/long.xml").read_text().splitlines()
+    assert sum('fromto="0 0 0 0.5 0 0"' in line for line in changed) == 2
+    assert sum('pos="0.25 0 0"' in line for line in changed) == 2
+    for number, model in (("by_set", ()), ("by_file", ("--model", "mine/long.xml"))):
+        change = model or ("--set", "b=0.5")
+        command = ("run", "mine/mine.toml", "--candidates", "mine/mine.py", "--quick", "--out", number)
+        done = workbench(*command, *change)
+        assert done.code == 0, done.err
+    by_set, by_file = (wb.load_run(name).series("first") for name in ("by_set", "by_file"))
+    assert by_set.filter(like="ref_").equals(by_file.filter(like="ref_"))
+
+
 def test_the_test_that_it_writes_passes_and_can_fail(workbench: Workbench) -> None:
     assert workbench("new", "mine").code == 0
     done = pytest_in("mine")
