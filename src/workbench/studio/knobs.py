@@ -15,6 +15,8 @@ SPANS = {"m": 0.1, "kg": 1.0, "kg m^2": 0.01, "m/s^2": 10.0, "N s/m": 5.0, "N m 
 
 SIDE = re.compile(r"[ _.-]*(?:left|right|upper|lower|at|of|[0-9]+)(?=_|$)|[ _.-]*[0-9]+$")
 WORLD = "world"
+JOINTS = "friction and rotors"
+"""Heading of what stands at joints: damping, dry friction, armature; mostly zero, and many."""
 NOTHING = 1e-9
 """SI; a number that is smaller is the zero that a computation left."""
 
@@ -117,6 +119,8 @@ def _body(robot: Robot, name: str) -> str:
 def _body_of(robot: Robot, target: Target) -> str:
     model = robot.reference.compiled()
     element, first = target.element, target.name.split("\n")[0]
+    if element == "joint":
+        return JOINTS
     if element == "inertial":
         return first
     if element == "body":  # where it sits in its parent is a length of the parent
@@ -125,8 +129,6 @@ def _body_of(robot: Robot, target: Target) -> str:
         return WORLD
     lookup = {"site": (model.site, "bodyid"), "distance": (model.site, "bodyid"), "geom": (model.geom, "bodyid")}
     try:
-        if element == "joint":
-            return str(model.body(int(model.joint(first).bodyid[0])).name)
         find, attribute = lookup[element]
         return str(model.body(int(getattr(find(first), attribute)[0])).name)
     except KeyError:  # a geom without a name, of a body with that name
