@@ -13,7 +13,10 @@ from workbench.studio.session import Session
 PICTURE = (1200, 1600)
 """Height and width of a picture, pixels."""
 
-STYLE = "white-space:pre-wrap;word-break:break-word;font:0.75rem/1.4 ui-monospace,monospace;padding:0.5em;margin:0 0.7em;border:1px solid color-mix(in srgb,currentColor 25%,transparent);border-radius:4px;user-select:all"  # noqa: E501
+STYLE = (
+    "white-space:pre-wrap;word-break:break-word;font:0.75rem/1.4 ui-monospace,monospace;padding:0.5em;margin:0 0.7em;"
+    "border:1px solid color-mix(in srgb,currentColor 25%,transparent);border-radius:4px;user-select:all"
+)
 
 
 class Keep:
@@ -62,7 +65,8 @@ class Keep:
 
     def say(self, label: str, text: str) -> None:
         """Show a text under the buttons; one click selects all of it."""
-        self._said.content = f'<p style="margin:0.4em 0.7em"><b>{escape(label)}</b></p><pre tabindex="0" style="{STYLE}">{escape(text)}</pre>'
+        head = f'<p style="margin:0.4em 0.7em"><b>{escape(label)}</b></p>'
+        self._said.content = f'{head}<pre tabindex="0" style="{STYLE}">{escape(text)}</pre>'
 
     def _send(self, event: Any, name: str, content: bytes) -> None:
         if event.client is not None:

@@ -64,7 +64,8 @@ def own_samples(spec: CaseSpec) -> int | None:
     start, stop = getattr(motion, "start", None), getattr(motion, "stop", None)
     if start is None or stop is None or motion.rate is None:
         return None
-    return int(math.floor((stop - start) * motion.rate + 1e-9)) + 1
+    steps: float = (stop - start) * motion.rate
+    return math.floor(steps + 1e-9) + 1
 
 
 def thinned_spec(spec: CaseSpec, samples: int = SAMPLES) -> CaseSpec:
