@@ -18,12 +18,12 @@ MISSING = "the studio needs the extra studio: pip install 'parallel-robot-workbe
 
 def studio(
     what: Annotated[
-        str,
+        str | None,
         typer.Argument(
             metavar="[ROBOT | CAMPAIGN | RUN]",
             help="Folder or file of a robot, a campaign, the directory of a run, or a name that comes along.",
         ),
-    ] = "asym_2rss_ppap",
+    ] = None,
     case: Annotated[str | None, typer.Option(metavar="CASE", help="Case to begin with. Default: the first.")] = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter in every case, SI.")
@@ -53,6 +53,7 @@ def studio(
         import viser  # noqa: F401
     except ImportError as error:  # before anything is read: who lacks it wants to know at once
         raise MissingExtraError(MISSING.format(reason="is not installed")) from error
+    from workbench.robots.catalogue import bundled_robots
     from workbench.studio.life import serve
     from workbench.studio.session import Session
     from workbench.studio.subject import open_subject
@@ -60,7 +61,10 @@ def studio(
     values, relative = settings(set_ or [])
     if relative:
         raise ParameterError(f"studio: --set {relative[0]}: allowed: NAME=VALUE; factors can be typed on the page")
-    session = Session(open_subject(what, model=model, settings=values, candidates=candidates or []), case)
+    session = Session(
+        open_subject(what or next(iter(bundled_robots())), model=model, settings=values, candidates=candidates or []),
+        case,
+    )
 
     def started(address: Address) -> None:
         out.print(f"workbench studio: {address.url}", soft_wrap=True, markup=False, highlight=False)
