@@ -18,7 +18,7 @@ SAMPLES = 200
 MOST_TABLE_SAMPLES = 400
 """Of a table, whose samples are its own, every sample is taken up to here; beyond, every second, third, ..."""
 
-PER_SPEED = ("start", "stop", "lift_time", "traverse_time", "lower_time", "dwell", "overlap")
+PER_SPEED = ("start", "stop", "lift_time", "traverse_time", "lower_time", "dwell")
 """Seconds of a motion, which a factor on its speed divides."""
 
 

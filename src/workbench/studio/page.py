@@ -50,6 +50,11 @@ class Page:
         self._lock = threading.RLock()
         self._settling: threading.Timer | None = None
         self._moved: str | None = None
+        """the slider that is in a hand"""
+        self._reached: str | None = None
+        """the slider whose reach was looked for last"""
+        self._placing = 0
+        """the thread that puts inputs somewhere; what they say in it is not a hand's"""
         self._ended = threading.Event()
         self.worker = Worker(self._fault)
         server.gui.set_panel_label("workbench studio")
@@ -59,6 +64,7 @@ class Page:
         self._controls()
         self._hotkeys()
         self._show()
+        self.worker.ask("reach", lambda: self._reach(None))
         self._player = threading.Thread(target=self._play, name="studio player", daemon=True)
         self._player.start()
 
@@ -113,7 +119,7 @@ class Page:
         with tabs.add_tab("Keep"):
             self.keep = Keep(gui, self.session)
         self._play_button.on_click(lambda _: self.play(not self._playing))
-        self._time.on_update(lambda _: None if self._playing else self.at(int(self._time.value)))
+        self._time.on_update(lambda _: self._grabbed())
         self._pace.on_update(lambda _: setattr(self, "_speed", float(self._pace.value)))
         worst.on_click(lambda _: self.worst())
         steps.on_click(lambda event: self._step(event.target.value))
@@ -183,8 +189,11 @@ class Page:
     def _asked(self, change: Callable[[], object]) -> None:
         """Change what is wanted; whatever is wrong with it is said on the page."""
         with self._lock:
-            if self._quiet:
+            if self._placing == threading.get_ident():
                 return
+            if self._moved is None or self._moved != self._reached:
+                self.knobs.forget_reach()
+                self._reached = None
             try:
                 change()
             except WorkbenchError as error:
@@ -194,8 +203,6 @@ class Page:
             self._settle_later()
             self._head.content = words.head(self.session, working=True)
         self.worker.ask("compute", self._compute, drop=("reach",))
-
-    _quiet = False
 
     def _knob(self, name: str, value: float) -> None:
         self._moved = name
@@ -240,8 +247,7 @@ class Page:
             self.session.history.settle()
             if not self.session.stale and self.session.problem is None:
                 self._follow()
-        if moved is not None:
-            self.worker.ask("reach", lambda: self._reach(moved))
+        self.worker.ask("reach", lambda: self._reach(moved))
 
     # answering, in the worker's thread
 
@@ -249,9 +255,17 @@ class Page:
         self.session.compute()
         self._show()
 
-    def _reach(self, name: str) -> None:
-        reach = self.session.reach(name, lambda: self.worker.waiting)
-        if not self.worker.waiting:
+    def _reach(self, moved: str | None) -> None:
+        """Look how far sliders may go: the one that was moved; all lengths where closed forms answer quickly."""
+        if self.session.stale:
+            return
+        quick = self.session.robot().closed_kinematics
+        others = [knob.name for knob in self.session.knobs if knob.unit == "m" and not knob.part and quick]
+        for name in dict.fromkeys([*([moved] if moved else []), *others]):
+            reach = self.session.reach(name, lambda: self.worker.waiting)
+            if self.worker.waiting:
+                return
+            self._reached = moved
             self.knobs.show_reach(name, reach)
 
     def _compare(self) -> None:
@@ -289,14 +303,14 @@ class Page:
         session, wanted = self.session, self.session.wanted
         if session.problem is None:
             self.knobs.follow(session.values(), self._moved)
-        self._quiet = True
+        self._placing = threading.get_ident()
         try:
             self._case.value = wanted.case
             self._amplitude.value, self._fast.value = wanted.amplitude, wanted.speed
             for index, box in enumerate(self._held):
                 box.value = index in wanted.rows
         finally:
-            self._quiet = False
+            self._placing = 0
 
     def _fault(self, error: BaseException) -> None:
         self.session.problem = f"a fault of the studio itself, {type(error).__name__}: {error}"
@@ -323,7 +337,17 @@ class Page:
             self.scene.pose(self.sample)
             self.curves.mark(self.sample)
             self._moment.content = words.moment(self.session.good, self.sample)
-            self._time.value = self.sample
+            self._put_time()
+
+    def _grabbed(self) -> None:
+        if self._placing != threading.get_ident():
+            self.play(False)
+            self.at(int(self._time.value))
+
+    def _put_time(self) -> None:
+        self._placing = threading.get_ident()
+        self._time.value = self.sample
+        self._placing = 0
 
     def _play(self) -> None:
         last = marked = time.monotonic()
@@ -343,7 +367,7 @@ class Page:
                 self.scene.pose(self.sample)
                 if now - marked > 1 / MARKS_PER_S:
                     marked = now
-                    self._time.value = self.sample
+                    self._put_time()
                     self._moment.content = words.moment(self.session.good, self.sample)
                     self.curves.mark(self.sample)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -46,7 +47,8 @@ class Knobs:
         self._sliders: dict[str, Any] = {}
         self._reach: dict[str, tuple[float, float]] = {}
         self._folders: list[Any] = []
-        self._quiet = False
+        self._placing = 0
+        """the thread that puts sliders somewhere; what they say in it is not a hand's"""
         self.build()
 
     def build(self) -> None:
@@ -80,12 +82,12 @@ class Knobs:
 
         @slider.on_update
         def _(_: Any) -> None:
-            if not self._quiet:
+            if self._placing != threading.get_ident():
                 self._changed(knob.name, float(slider.value))
 
     def follow(self, values: Mapping[str, float], moved: str | None = None) -> None:
         """Put the sliders where the parameters are; *moved* is in a hand, and left alone."""
-        self._quiet = True
+        self._placing = threading.get_ident()
         try:
             for knob in self._session.knobs:
                 slider, value = self._sliders.get(knob.name), knob.value(values)
@@ -100,7 +102,7 @@ class Knobs:
                 if slider.hint != text:
                     slider.hint = text
         finally:
-            self._quiet = False
+            self._placing = 0
 
     def show_reach(self, name: str, reach: tuple[float, float]) -> None:
         """Let a slider end where the motion leaves the robot's reach."""
@@ -108,19 +110,20 @@ class Knobs:
         if slider is None:
             return
         self._reach[name] = reach
-        self._quiet = True
+        self._placing = threading.get_ident()
         try:
             low, high = min(reach[0], slider.value), max(reach[1], slider.value)
             if low < high and (slider.min, slider.max) != (low, high):
                 slider.min, slider.max = low, high
             slider.hint = hint_of(knob, self._session, reach)
         finally:
-            self._quiet = False
+            self._placing = 0
 
     def forget_reach(self) -> None:
         """Give the sliders their whole range back: what is in reach has changed."""
-        self._reach = {}
-        for knob in self._session.knobs:
-            slider = self._sliders.get(knob.name)
+        names, self._reach = tuple(self._reach), {}
+        for name in names:
+            slider, knob = self._sliders.get(name), self._session.knob(name)
             if slider is not None:
                 slider.min, slider.max = min(knob.low, slider.value), max(knob.high, slider.value)
+                slider.hint = hint_of(knob, self._session)

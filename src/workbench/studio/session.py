@@ -65,7 +65,9 @@ class Session:
         campaign = self.subject.campaign
         names = [one.name for one in campaign.case]
         if case is not None and case not in names:
-            raise ParameterError(f'{self.subject.shown_campaign}: no case "{case}"{did_you_mean(case, names)}', case=case)
+            raise ParameterError(
+                f'{self.subject.shown_campaign}: no case "{case}"{did_you_mean(case, names)}', case=case
+            )
         # what is wrong on purpose is offered, and not shown before it is asked for
         rows = tuple(i for i, candidate in enumerate(campaign.candidate) if not candidate.expect_fail)
         return State(case or names[0], rows=rows)

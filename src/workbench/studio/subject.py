@@ -182,9 +182,9 @@ def _of_run(
 
 
 def _campaign_of(folder: Path, stored: str, name: str) -> Path:
-    """Find the file of the campaign that a run was made from: beside the run or above it, from here, or one of ours."""
+    """Find the file of the campaign that a run was made from: from here, beside the run, close above it, or ours."""
     whole = folder.resolve()
-    for place in (Path(), whole, *whole.parents):
+    for place in (Path(), whole, *whole.parents[:2]):
         for candidate in (place / stored, place / Path(stored).name):
             with contextlib.suppress(OSError, WorkbenchError):
                 if candidate.is_file() and load_campaign(candidate)[0].name == name:
