@@ -45,7 +45,9 @@ def main() -> None:
     parser.add_argument("what", nargs="*", default=["asym_2rss_ppap", "planar_4rprp"])
     parser.add_argument("--candidates", action="append", default=[])
     arguments = parser.parse_args()
-    print(f"{'robot':24s} {'parameter':>10s} {'samples':>8s} {'clock ms':>9s} {'processor ms':>13s}  <= {ALLOWED_MS:g} ms")
+    print(
+        f"{'robot':24s} {'parameter':>10s} {'samples':>8s} {'clock ms':>9s} {'processor ms':>13s}  <= {ALLOWED_MS:g} ms"
+    )
     for what in arguments.what:
         session = Session(open_subject(what, candidates=arguments.candidates))
         knobs = [k for k in session.knobs if k.settable and not k.part and k.value(session.values()) > 0]

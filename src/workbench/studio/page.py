@@ -215,15 +215,11 @@ class Page:
     def _type(self, text: str) -> None:
         def change() -> None:
             table = self.session.subject.base.description.table
-            for part in text.replace(";", ",").split(","):
-                if not part.strip():
-                    continue
-                name = parse_assignment(part).name
-                if name in ("amplitude", "speed"):
-                    self.session.move(**{name: parse_assignment(part).number})
-                    continue
-                for member, value in resolve_changes(table, self.session.values(), [part]).items():
-                    self.session.set(member, value)
+            parts = [part for part in text.replace(";", ",").split(",") if part.strip()]
+            given = {part: parse_assignment(part) for part in parts}
+            factors = {one.name: one.number for one in given.values() if one.name in ("amplitude", "speed")}
+            others = [part for part, one in given.items() if one.name not in factors]
+            self.session.set_many(resolve_changes(table, self.session.values(), others), **factors)
 
         self._moved = None
         self._asked(change)
@@ -341,8 +337,9 @@ class Page:
 
     def _grabbed(self) -> None:
         if self._placing != threading.get_ident():
+            wanted = int(self._time.value)
             self.play(False)
-            self.at(int(self._time.value))
+            self.at(wanted)
 
     def _put_time(self) -> None:
         self._placing = threading.get_ident()

@@ -82,8 +82,11 @@ class Session:
         ParameterError
             Unknown name, or a value that is not a number or not allowed.
         """
-        table = self.subject.base.description.table
-        given = table.expand({name: value})
+        return self.set_many({name: value}, gesture)
+
+    def set_many(self, values: Mapping[str, float], gesture: Hashable = None, **factors: float) -> State:
+        """Set several parameters, and factors on the motion (`move`), as one step; errors as of `set`."""
+        given = self.subject.base.description.table.expand(values)
         changes = dict(self.wanted.changes)
         for member, number in given.items():
             changes.pop(member, None)
@@ -91,7 +94,7 @@ class Session:
             if number != self._values(changes)[member]:
                 changes[member] = number
         self._values(changes)  # raises what is not allowed before it is asked for
-        return self.history.change(gesture, changes=changes)
+        return self.history.change(gesture, changes=changes, **factors)
 
     def _values(self, changes: Mapping[str, float]) -> Mapping[str, float]:
         table = self.subject.base.description.table
