@@ -11,14 +11,14 @@ import pytest
 
 pytest.importorskip("viser", reason="the extra studio is not installed")
 
-from workbench.studio.curves import COORDINATE, ERROR, POWER, TORQUE, curves_of  # noqa: E402
-from workbench.studio.page import Page  # noqa: E402
-from workbench.studio.scene import MARKS, bounds, flat_axis  # noqa: E402
-from workbench.studio.server import start_server  # noqa: E402
-from workbench.studio.session import Session  # noqa: E402
-from workbench.studio.solid_meshes import triangles  # noqa: E402
-from workbench.studio.subject import Subject, open_subject  # noqa: E402
-from workbench.studio.worker import Worker  # noqa: E402
+from workbench.studio.curves import COORDINATE, ERROR, POWER, TORQUE, curves_of
+from workbench.studio.page import Page
+from workbench.studio.scene import MARKS, bounds, flat_axis
+from workbench.studio.server import start_server
+from workbench.studio.session import Session
+from workbench.studio.solid_meshes import triangles
+from workbench.studio.subject import Subject, open_subject
+from workbench.studio.worker import Worker
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PATIENCE = 120.0
@@ -123,10 +123,10 @@ def test_marks_slice_and_target(page: Page) -> None:
     idle(page)
     start = np.asarray(page.pointing._grip.position)
     origin, rotation = page.pointing._frame()
-    page.pointing._grip.position = start + [0.0, 0.01, 0.01]
+    page.pointing._grip.position = start + np.array([0.0, 0.01, 0.01])
     page.pointing._to(origin, rotation)
     assert "In reach" in page.pointing._said.content
-    page.pointing._grip.position = start + [0.0, 0.0, -9.0]
+    page.pointing._grip.position = start + np.array([0.0, 0.0, -9.0])
     page.pointing._to(origin, rotation)
     assert "Out of reach" in page.pointing._said.content
 

@@ -90,6 +90,13 @@ def test_a_bar_follows_its_mass_and_length_unless_its_inertia_is_set(session: Se
     assert session.values()["I2_left"] == pytest.approx(0.7 * 0.3**2 / 12, rel=1e-15)
 
 
+def test_an_inertia_that_is_set_with_its_mass_is_what_was_set(session: Session) -> None:
+    own = session.values()["I2_left"]
+    session.set_many({"I2": own, "m2": 0.6})
+    assert session.values()["I2_left"] == own
+    assert session.values()["m2_left"] == 0.6
+
+
 def test_setting_what_the_case_has_is_no_change(session: Session) -> None:
     session.set("a1", 0.21)
     session.set("a1", 0.2)

@@ -20,9 +20,9 @@ pytest.importorskip("viser", reason="the extra studio is not installed")
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from workbench.studio.life import serve  # noqa: E402
-from workbench.studio.session import Session  # noqa: E402
-from workbench.studio.subject import open_subject  # noqa: E402
+from workbench.studio.life import serve
+from workbench.studio.session import Session
+from workbench.studio.subject import open_subject
 
 pytestmark = pytest.mark.browser
 
@@ -32,6 +32,15 @@ WEBGL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-
          "--disable-background-networking", "--disable-component-update", "--disable-sync")  # fmt: skip
 PATIENCE_MS = 240_000
 """A software renderer on a busy machine."""
+DRAWN = """() => [...document.querySelectorAll('.uplot canvas')].every(canvas => {
+  const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  let seen = 0;
+  for (let i = 0; i < data.length; i += 4) {
+    seen += Math.abs(data[i] - 28) + Math.abs(data[i + 1] - 126) + Math.abs(data[i + 2] - 214) < 60;
+  }
+  return seen > 40;
+})"""
+"""Whether every plot shows a line in the reference's colour."""
 ROBOTS = {
     "asym_2rss_ppap": ("asym_2rss_ppap", (), "pick_and_place"),
     "planar_4rprp": ("planar_4rprp", (), None),
@@ -116,6 +125,8 @@ def test_a_robot_is_shown_and_answers_the_keyboard_and_nobody_else_is_asked(brow
         page.wait_for_selector("text=Changed here")
         assert session.values()[mass.members[0]] == pytest.approx(before + mass.step, rel=1e-6)
         page.wait_for_selector("text=change")
+        page.get_by_role("button", name="Worst moment").click()
+        page.wait_for_function(DRAWN)
         page.get_by_role("button", name="Undo").click()
         page.wait_for_selector("text=nothing was changed here")
         assert session.values()[mass.members[0]] == before

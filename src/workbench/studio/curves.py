@@ -152,11 +152,13 @@ class Curves:
         series = [
             {"label": "t [s]"},
             *(
-                {"label": line.label, "stroke": line.colour, "width": line.width, "points": {"show": False}}
+                {"label": line.label, "stroke": line.colour, "width": line.width, "points": {"show": False},
+                 "auto": bool(np.isfinite(line.values).all())}
                 | ({"dash": line.dash} if line.dash else {})
                 for line in lines
             ),
-            {"label": "now", "stroke": NOW_COLOUR, "width": 0,
+            # a plot's range is not found where the first number is none
+            {"label": "now", "stroke": NOW_COLOUR, "width": 0, "auto": False,
              "points": {"show": True, "size": 8, "fill": NOW_COLOUR, "stroke": NOW_COLOUR}},
         ]  # fmt: skip
         return self._gui.add_uplot(

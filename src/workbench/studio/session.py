@@ -87,13 +87,13 @@ class Session:
     def set_many(self, values: Mapping[str, float], gesture: Hashable = None, **factors: float) -> State:
         """Set several parameters, and factors on the motion (`move`), as one step; errors as of `set`."""
         given = self.subject.base.description.table.expand(values)
-        changes = dict(self.wanted.changes)
-        for member, number in given.items():
-            changes.pop(member, None)
-            # bars follow their mass and length: only another number than what follows is a change
-            if number != self._values(changes)[member]:
-                changes[member] = number
+        changes = {**self.wanted.changes, **given}
         self._values(changes)  # raises what is not allowed before it is asked for
+        for member, number in given.items():
+            # bars follow their mass and length: only another number than what follows is a change
+            others = {name: value for name, value in changes.items() if name != member}
+            if number == self._values(others)[member]:
+                changes = others
         return self.history.change(gesture, changes=changes, **factors)
 
     def _values(self, changes: Mapping[str, float]) -> Mapping[str, float]:
