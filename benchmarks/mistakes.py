@@ -3,6 +3,8 @@
     python benchmarks/mistakes.py --count 300 --seed 1 --out mistakes.json [--search] [--at-once 2]
 
 Formulas: the papers' appendix and eq. (4), the 4-RPRP by screws, a Delta and a planar 3-RRR, each as one plain file.
+One process for all: the reference answers each question once for each robot, since only the formula changes, and edits
+are scored in this process, without a worker's limits. So the times printed are of a warm diagnosis.
 A mistake is one edit of the kinds of issue "diagnose" (signs, factors, sine for cosine, indices, names, parameters,
 exponents, quotients, terms dropped), chosen at random with equal weight for each kind, on a line that the formula runs
 through. Edits that change no torque at any of the probed states, with parameters varied or not, are no mistakes and are
@@ -19,10 +21,13 @@ import tempfile
 import time
 from collections import Counter, defaultdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from workbench.campaign.user_candidates import load_candidates
+from workbench.diagnosis import examine, search
+from workbench.diagnosis.case_subject import CaseSubject
 from workbench.diagnosis.edits import (
     DROP,
     EXPONENT,
@@ -37,10 +42,9 @@ from workbench.diagnosis.edits import (
     edits_of,
 )
 from workbench.diagnosis.entries import WRONG_MARK, compare_parts, floors_of
-from workbench.diagnosis.examine import diagnose_subject
 from workbench.diagnosis.parts import FORCE, ODD, REST, take_apart
 from workbench.diagnosis.probes import ask, choose_poses, make_plan
-from workbench.diagnosis.search import groups_of, lines_run, search_mends
+from workbench.diagnosis.search import groups_of, lines_run
 from workbench.diagnosis.surface import subjects
 from workbench.errors import WorkbenchError
 
@@ -75,11 +79,68 @@ def formulas(folder: Path, names: list[str]) -> dict[str, tuple[Path, Path, str]
         path.write_text(text)
         campaign = "garcia_murillo_2016" if name == "screws" else "almeida_2010"
         found[name] = ROOT / "campaigns" / f"{campaign}.toml", path, f"printed-{name}"
-    for name, candidate in (("delta", "exact"), ("rrr", "virtual-work")):
-        home = ROOT / "examples" / name
-        if (home / f"{name}.py").is_file():
-            found[name] = home / f"{name}.toml", home / f"{name}.py", candidate
+    for home, candidate in ((ROOT / "examples" / "delta", "exact"), (ROOT / "benchmarks" / "rrr", "virtual-work")):
+        name = home.name
+        found[name] = home / f"{name}.toml", home / f"{name}.py", candidate
     return {name: found[name] for name in names if name in found}
+
+
+class Warm(CaseSubject):
+    """A formula on a robot whose reference has been asked the same before."""
+
+    memory: dict[Any, Any]
+
+    @classmethod
+    def of(cls, subject: CaseSubject, memory: dict[Any, Any]) -> Warm:
+        warm = cls(subject.case, subject.candidate, subject.mass_model, subject._others)
+        warm.memory, warm._references = memory, subject._references
+        warm.__dict__["motion"] = subject.motion
+        return warm
+
+    def torques_of_reference(self, q, qd, qdd, force, changes):
+        key = (*(array.tobytes() for array in (q, qd, qdd, force)), *sorted(changes.items()))
+        if key not in self.memory:
+            try:
+                self.memory[key] = super().torques_of_reference(q, qd, qdd, force, changes)
+            except WorkbenchError as error:
+                self.memory[key] = error
+        if isinstance(self.memory[key], WorkbenchError):
+            raise self.memory[key]
+        return self.memory[key]
+
+
+def remember(function, key):
+    """The same function, asked once for each key of its arguments."""
+    known = {}
+
+    def remembered(*arguments):
+        name = key(*arguments)
+        if name not in known:
+            known[name] = function(*arguments)
+        return known[name]
+
+    return remembered
+
+
+def warm() -> None:
+    """Let poses and items of a robot be found once."""
+    examine.choose_poses = remember(choose_poses, lambda subject, *count: (subject.case.robot.name, *count))
+    items = examine.items_of
+    examine.items_of = remember(items, lambda s, plan: (s.case.robot.name, s.mass_model, plan.poses.tobytes()))
+
+
+class InProcess:
+    """Scores edits where the search runs, in place of `workbench.sweep.supervisor.Supervisor`."""
+
+    def __init__(self, jobs, setup, *limits) -> None:
+        self.work = setup()
+
+    def run(self, tasks):
+        for number, task in tasks:
+            yield number, self.work(task)
+
+    def close(self) -> None:
+        """Nothing to close."""
 
 
 def parts_at(subject, plan, changes):
@@ -94,8 +155,9 @@ class Bench:
     def __init__(self, campaign: Path, path: Path, candidate: str, rng: random.Random) -> None:
         self.campaign, self.path, self.candidate, self.rng = campaign, path, candidate, rng
         self.text = path.read_text()
-        self.subject = subjects(campaign, candidates=[path], candidate=candidate)[0]
-        self.plan = make_plan(self.subject, choose_poses(self.subject))
+        self.memory: dict[Any, Any] = {}
+        self.subject = Warm.of(subjects(campaign, candidates=[path], candidate=candidate)[0], self.memory)
+        self.plan = make_plan(self.subject, examine.choose_poses(self.subject))
         self.parameters = [p for p in self.subject.parameters if p.read and p.kind in ("mass", "inertia")]
         self.right = {None: parts_at(self.subject, self.plan, {})}
         for p in self.parameters:
@@ -107,6 +169,7 @@ class Bench:
         for edit in edits:
             if edit.kind in KINDS:
                 self.by_kind[edit.kind].append(edit)
+        self.redrawn = 0
 
     def truth(self, subject):
         """Entries that differ, and parameters whose shares do; None where the formula fails."""
@@ -156,24 +219,22 @@ class Bench:
                 users = load_candidates([path])
                 case = self.subject.case
                 case.robot.offer({u.name: u.as_candidate() for u in users if u.name == self.candidate})
-                subject = type(self.subject)(case, self.candidate, self.subject.mass_model, self.subject._others)
-                subject.__dict__["motion"] = self.subject.motion
-                subject._references = self.subject._references
-                subject.__dict__["reads"] = self.subject.reads
+                subject = Warm.of(self.subject, self.memory)
                 truth = self.truth(subject)
             except (WorkbenchError, SyntaxError):
                 continue
             if truth is None:
+                self.redrawn += 1
                 continue
             return subject, kinds, lines, truth, text
         raise SystemExit("no mistake to be planted")
 
 
-def judged(bench: Bench, subject, truth, text: str, lines: list[int], search: bool, limit: float) -> dict:
+def judged(bench: Bench, subject, truth, text: str, lines: list[int], mend: bool, limit: float) -> dict:
     """What the diagnosis says of one planted formula, held against the truth."""
     entries, shares = truth
     begun = time.perf_counter()
-    diagnosis, seen = diagnose_subject(subject)
+    diagnosis, seen = examine.diagnose_subject(subject)
     named = {(e.part, e.joint) for e in diagnosis.wrong if e.part.kind not in (ODD, REST)}
     true = {(part, joint) for part, joint in entries if part.kind not in (ODD, REST)}
     kinematic = any(f.kind == "kinematics" for f in diagnosis.findings)
@@ -189,9 +250,9 @@ def judged(bench: Bench, subject, truth, text: str, lines: list[int], search: bo
         "seconds_findings": round(time.perf_counter() - begun, 2),
         "findings": [f.sentence for f in diagnosis.findings],
     }
-    if search:
+    if mend:
         begun = time.perf_counter()
-        found, _ = search_mends(subject, seen, limit)
+        found, _ = search.search_mends(subject, seen, limit)
         row["seconds_search"] = round(time.perf_counter() - begun, 2)
         want = bench.text.splitlines()
         have = text.splitlines()
@@ -225,28 +286,32 @@ def main() -> None:
     parser.add_argument("--search", action="store_true")
     parser.add_argument("--limit", type=float, default=60.0)
     parser.add_argument("--robots", default="appendix,equation4,screws,delta,rrr")
-    parser.add_argument("--rrr", type=Path, help="folder with rrr.toml and its formula, where examples/ has none")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     rng = random.Random(options.seed)
+    search.Supervisor = InProcess
+    warm()
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         table = formulas(folder, options.robots.split(","))
-        if options.rrr and "rrr" in options.robots.split(","):
-            table["rrr"] = options.rrr / "rrr.toml", next(options.rrr.glob("*.py")), "virtual-work"
         benches = {robot: Bench(*entry, rng) for robot, entry in table.items()}
         for number in range(options.count):
             robot = list(benches)[number % len(benches)]
             bench = benches[robot]
             subject, kinds, lines, truth, text = bench.planted(folder, options.at_once)
-            row = {"robot": robot, "kinds": kinds, "lines": lines}
+            row = {"robot": robot, "kinds": kinds, "lines": lines, "seed": options.seed}
             row |= judged(bench, subject, truth, text, lines, options.search, options.limit)
             rows.append(row)
             print(number, robot, kinds, {k: v for k, v in row.items() if isinstance(v, bool)}, flush=True)
+            if not all(v for v in row.values() if isinstance(v, bool)):
+                changed = [(o.strip(), n.strip()) for o, n in zip(bench.text.splitlines(), text.splitlines()) if o != n]
+                row["planted"] = changed
+                print("   ", changed, lines, row["findings"], row.get("mends"), flush=True)
             if options.out:
                 options.out.write_text(json.dumps(rows, indent=1) + "\n")
     summary(rows)
+    print(f"drawn again, since no torque changes or all fail: {sum(bench.redrawn for bench in benches.values())}")
 
 
 def summary(rows: list[dict]) -> None:
