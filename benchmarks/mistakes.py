@@ -44,6 +44,7 @@ from workbench.diagnosis.edits import (
 from workbench.diagnosis.entries import WRONG_MARK, compare_parts, floors_of
 from workbench.diagnosis.parts import FORCE, ODD, REST, take_apart
 from workbench.diagnosis.probes import ask, choose_poses, make_plan
+from workbench.diagnosis.result import NUMERIC
 from workbench.diagnosis.search import groups_of, lines_run
 from workbench.diagnosis.surface import subjects
 from workbench.errors import WorkbenchError
@@ -172,20 +173,21 @@ class Bench:
         self.redrawn = 0
 
     def truth(self, subject):
-        """Entries that differ, and parameters whose shares do; None where the formula fails."""
-        wrong = {None: parts_at(subject, self.plan, {})}
-        if not any(np.isfinite(v).any() for v in wrong[None].values()):
+        """Entries that differ, and parameters whose shares do; None where the formula fails or nothing differs."""
+        wrong = parts_at(subject, self.plan, {})
+        if not any(np.isfinite(v).any() for v in wrong.values()):
             return None
         entries = {
-            (e.part, e.joint)
-            for e in compare_parts(wrong[None], self.right[None], self.floors)
-            if e.status == WRONG_MARK
+            (e.part, e.joint) for e in compare_parts(wrong, self.right[None], self.floors) if e.status == WRONG_MARK
         }
+        whole = np.flatnonzero(np.all([np.isfinite(v).all(axis=1) for v in wrong.values()], axis=0))[:8]
+        poses = whole if len(whole) else np.arange(8)
+        few = make_plan(subject, self.plan.poses[poses])
         shares = set()
         for p in self.parameters:
-            moved = parts_at(subject, self.plan, {p.name: p.varied})
-            mine = {k: moved[k] - v for k, v in wrong[None].items()}
-            theirs = {k: v - self.right[None][k] for k, v in self.right[p.name].items()}
+            moved = parts_at(subject, few, {p.name: p.varied})
+            mine = {k: moved[k] - v[poses] for k, v in wrong.items()}
+            theirs = {k: v[poses] - self.right[None][k][poses] for k, v in self.right[p.name].items()}
             if any(e.status == WRONG_MARK for e in compare_parts(mine, theirs, self.floors, 1e-6, 1e-10)):
                 shares.add(p.name)
         if not entries and not shares:
@@ -236,6 +238,11 @@ def judged(bench: Bench, subject, truth, text: str, lines: list[int], mend: bool
     begun = time.perf_counter()
     diagnosis, seen = examine.diagnose_subject(subject)
     named = {(e.part, e.joint) for e in diagnosis.wrong if e.part.kind not in (ODD, REST)}
+    for finding in diagnosis.findings:
+        if finding.kind == NUMERIC:  # the table shows what is noisy as right, the finding says that it is not
+            strict = compare_parts(seen.formula, seen.reference, seen.floors)
+            named |= {(e.part, e.joint) for e in strict if e.status == WRONG_MARK and e.part.kind not in (ODD, REST)}
+            assert {e.part.label(subject.joints) for e in strict if e.status == WRONG_MARK} <= set(finding.parts)
     true = {(part, joint) for part, joint in entries if part.kind not in (ODD, REST)}
     kinematic = any(f.kind == "kinematics" for f in diagnosis.findings)
     parameters = {name for f in diagnosis.findings for name in f.parameters}
@@ -255,7 +262,6 @@ def judged(bench: Bench, subject, truth, text: str, lines: list[int], mend: bool
         found, _ = search.search_mends(subject, seen, limit)
         row["seconds_search"] = round(time.perf_counter() - begun, 2)
         want = bench.text.splitlines()
-        have = text.splitlines()
         steps = sorted({s.step for s in found})
         got = 0
         for line in lines:
@@ -266,7 +272,7 @@ def judged(bench: Bench, subject, truth, text: str, lines: list[int], mend: bool
                     break
         row["undone"] = got == len(lines)
         row["complete"] = bool(found) and found[-1].left == 0
-        row["planted"] = [(have[line - 1].strip(), want[line - 1].strip()) for line in lines]
+        row["mends"] = [f"{s.step}: {s.diff}" for s in found]
     return row
 
 
@@ -305,9 +311,9 @@ def main() -> None:
             rows.append(row)
             print(number, robot, kinds, {k: v for k, v in row.items() if isinstance(v, bool)}, flush=True)
             if not all(v for v in row.values() if isinstance(v, bool)):
-                changed = [(o.strip(), n.strip()) for o, n in zip(bench.text.splitlines(), text.splitlines()) if o != n]
-                row["planted"] = changed
-                print("   ", changed, lines, row["findings"], row.get("mends"), flush=True)
+                was, now = bench.text.splitlines(), text.splitlines()
+                row["planted"] = [(now[line - 1].strip(), was[line - 1].strip()) for line in lines]
+                print("   ", row["planted"], row["findings"], row.get("mends"), flush=True)
             if options.out:
                 options.out.write_text(json.dumps(rows, indent=1) + "\n")
     summary(rows)

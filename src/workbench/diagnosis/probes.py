@@ -185,9 +185,9 @@ def ask(plan: Plan, torques: Torques) -> tuple[FloatArray, dict[tuple[str | int,
     ends = [probe for probe in hard if plan.labels[probe] in (("rest",), ("mixed", 0))]
     for pose in poses:
         one = np.array([pose])
-        if len(ends) == 2 and not any([answered(np.array([probe]), one) for probe in ends]):
-            continue
-        for probe in hard:
-            if probe not in ends or len(ends) < 2:
-                answered(np.array([probe]), one)
+        fine = [answered(np.array([probe]), one) for probe in ends]
+        if len(ends) < 2 or any(fine):
+            for probe in hard:
+                if probe not in ends:
+                    answered(np.array([probe]), one)
     return found, failures
