@@ -216,9 +216,9 @@ def _jumping(seen: Examined, joints: tuple[str, ...]) -> Finding:
         f"kinematics first: at {jumps.sum()} of {len(jumps)} poses the torques jump between poses that are as good as"
         " the same: an iteration inside does not converge there, or ends on one branch and then on another"
     )
-    calm = [{part: tau[~jumps] for part, tau in parts.items()} for parts in (seen.formula, seen.reference)]
+    mine, theirs = ({part: tau[~jumps] for part, tau in parts.items()} for parts in (seen.formula, seen.reference))
     if not jumps.all():
-        left = compare_parts(*calm, seen.floors, noise=SAFETY * seen.noises[~jumps])
+        left = compare_parts(mine, theirs, seen.floors, noise=SAFETY * seen.noises[~jumps])
         off = [e for e in left if e.status == WRONG_MARK]
         share = f"{len(off)} entries are wrong there too" if off else "everything is right there"
         text += f"; at the others it is smooth, and {share}"
@@ -250,8 +250,8 @@ def _rounded(seen: Examined, joints: tuple[str, ...]) -> Finding | None:
     digits = max(1, int(-np.log10(max(e.weight for e in wrong))))
     text = (
         f"no term is wrong, but numbers are: all parts agree to {digits} digits and no better (at most {percent(worst)}"
-        " off in any), as where constants are rounded, derivatives are taken by finite differences, or an iteration ends"
-        " early"
+        " off in any), as where constants are rounded, derivatives are taken by finite differences or an iteration"
+        " ends early"
     )
     shares_off = tuple(share.parameter.name for share in seen.shares if share.parameter.read and share.wrong)
     if shares_off:

@@ -165,29 +165,28 @@ def ask(plan: Plan, torques: Torques) -> tuple[FloatArray, dict[tuple[str | int,
         pass
     found = np.full(plan.q.shape, np.nan)
     failures: dict[tuple[str | int, ...], str] = {}
-    every = np.arange(len(plan.labels))
+    every = list(range(len(plan.labels)))
 
-    def answered(probes: FloatArray, poses: FloatArray) -> bool:
+    def answered(probes: list[int], poses: list[int]) -> bool:
         states = (array[np.ix_(probes, poses)] for array in (plan.q, plan.qd, plan.qdd, plan.force))
         try:
             tau = torques(*(array.reshape(-1, array.shape[2]) for array in states))
         except WorkbenchError as error:
             if len(probes) == 1:
-                failures.setdefault(plan.labels[int(probes[0])], str(error))
+                failures.setdefault(plan.labels[probes[0]], str(error))
             return False
         found[np.ix_(probes, poses)] = tau.reshape(len(probes), len(poses), -1)
         return True
 
-    poses = np.array([pose for pose in range(plan.q.shape[1]) if not answered(every, np.array([pose]))])
-    if not len(poses):  # it fails only on all of them at once
+    poses = [pose for pose in range(plan.q.shape[1]) if not answered(every, [pose])]
+    if not poses:  # it fails only on all of them at once
         return found, {plan.labels[0]: "it fails where all states are asked at once, and answers one pose at a time"}
-    hard = [probe for probe in every if not answered(np.array([probe]), poses)]
+    hard = [probe for probe in every if not answered([probe], poses)]
     ends = [probe for probe in hard if plan.labels[probe] in (("rest",), ("mixed", 0))]
     for pose in poses:
-        one = np.array([pose])
-        fine = [answered(np.array([probe]), one) for probe in ends]
+        fine = [answered([probe], [pose]) for probe in ends]
         if len(ends) < 2 or any(fine):
             for probe in hard:
                 if probe not in ends:
-                    answered(np.array([probe]), one)
+                    answered([probe], [pose])
     return found, failures
