@@ -33,13 +33,15 @@ SPREAD = {MASS: (0.3, 3.0), INERTIA: (0.3, 3.0), GRAVITY: (0.3, 3.0), FRICTION: 
 def drawn(subject: CaseSubject, rng: random.Random) -> dict[str, float]:
     """Random values of all parameters that the model lets be set one at a time."""
     robot, values = subject.case.robot, {}
-    for name, info in robot.description.table.infos.items():
-        kind = KIND_OF_UNIT.get(info.unit, FRICTION)
+    # formulas of the papers' robots read one number for both sides, and that is the one to be drawn
+    read = {p.name: p.unit for p in subject.parameters if p.read} if robot.closed_form is not None else {}
+    for name, unit in (read or {name: info.unit for name, info in robot.description.table.infos.items()}).items():
+        kind = KIND_OF_UNIT.get(unit, FRICTION)
         low, high = SPREAD.get(kind, (0.9, 1.1))
         if kind == LENGTH or kind in SPREAD:
             value = float(getattr(robot.parameters, name)) * rng.uniform(low, high)
             try:
-                robot.with_parameters(**{name: value})
+                _ = robot.with_parameters(**{name: value}).reference
             except WorkbenchError:
                 continue
             values[name] = value
@@ -65,6 +67,8 @@ def main() -> None:
     rng, alarms, looked, again = random.Random(options.seed), 0, 0, 0
     for name in ("almeida_2010", "garcia_murillo_2016", "mass_models", "friction_2rss_ppap", "friction_4rprp"):
         for subject in subjects(ROOT / "campaigns" / f"{name}.toml"):
+            if subject.candidate == "screws-as-printed":
+                continue  # wrong on purpose
             alarms += judge(subject, f"{name} {subject.candidate}")
             looked += 1
     with tempfile.TemporaryDirectory() as folder:

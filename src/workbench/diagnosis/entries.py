@@ -100,6 +100,8 @@ def _entry(
 def ratio_of(found: FloatArray, wanted: FloatArray, slack: float = 0.0) -> Fraction | float | None:
     """Return found / wanted where it is the same throughout: a simple fraction where it is near one, else a number."""
     power = float(np.vdot(wanted, wanted))
+    if not (np.isfinite(found).all() and np.isfinite(power)):
+        return None
     if np.abs(wanted).max() <= slack or power == 0.0:
         return None
     ratio = float(np.vdot(found, wanted)) / power
@@ -111,6 +113,8 @@ def ratio_of(found: FloatArray, wanted: FloatArray, slack: float = 0.0) -> Fract
 
 def simple(ratio: float) -> Fraction | float:
     """Return the simple fraction that a ratio is, or the ratio itself."""
+    if not np.isfinite(ratio):
+        return ratio
     near = Fraction(ratio).limit_denominator(SIMPLE)
     if abs(float(near) - ratio) < 1e-5 * max(1.0, abs(ratio)) and abs(near.numerator) <= 4 * SIMPLE:
         return near
