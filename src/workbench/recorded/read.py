@@ -18,9 +18,6 @@ from workbench.errors import MotionError, did_you_mean
 from workbench.motion.digits import FULL, rounding_of
 
 MAX_SAMPLES = 100_000
-UNIFORM = 3.0**-0.5
-"""Standard deviation of an error that is spread evenly over +-1."""
-
 
 @dataclass(frozen=True)
 class Wanted:
@@ -36,8 +33,13 @@ class Written:
 
     digits: int
     """`FULL` and more: with all of them"""
-    sigma: float
-    """standard deviation of its rounding, SI; 0 where it has all digits"""
+    half: float
+    """half of its last place, SI; 0 where it has all digits"""
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of its rounding, SI."""
+        return self.half * UNIFORM
 
 
 @dataclass(frozen=True)
@@ -271,7 +273,7 @@ def _block(
     for column in found:
         assert column is not None
         half, digits = rounding_of(table.values[:, column.index])
-        written.append(Written(digits, half * column.factor * UNIFORM))
+        written.append(Written(digits, half * column.factor))
     return np.column_stack([column.si(table) for column in found if column]), tuple(written)
 
 
