@@ -15,9 +15,10 @@ from workbench.delimited import Column, Table, factor_of, find_columns, parse_ta
 from workbench.delimited.read import shown
 from workbench.delimited.units import spellings_of
 from workbench.errors import MotionError, did_you_mean
-from workbench.motion.digits import FULL, rounding_of
+from workbench.motion.digits import FULL, UNIFORM, rounding_of
 
 MAX_SAMPLES = 100_000
+
 
 @dataclass(frozen=True)
 class Wanted:

@@ -147,9 +147,7 @@ def smooth(t: FloatArray, y: FloatArray, rounding: float = 0.0) -> Smoothed:
     value = (y - shift) / scale - trend.derivatives[0]
     first = max((n - LONGEST) // 2, 0)
     part, steps = slice(first, first + LONGEST), slice(first, min(first + LONGEST, n) - 1)
-    best = min(
-        (_fit(value[part], trend.dt[steps], trend.drive(m)[steps], least) for m in ORDERS), key=lambda f: f.cost
-    )
+    best = min((_fit(value[part], trend.dt[steps], trend.drive(m)[steps], least) for m in ORDERS), key=lambda f: f.cost)
     factors, states = _factored(trend.dt, best.order, best.rho, value[:, None], trend.drive(best.order))
     backward(factors, states)
     covariance = np.empty((n, 3, 3))
@@ -210,7 +208,8 @@ def _fit(y: FloatArray, dt: FloatArray, drive: FloatArray, least: float) -> _Fit
         rho = 10.0 ** (2 * m * power)
         rss, logdet = forward(y[:, None], dt, white, transition, drive, rho, factors, rhs, False)
         variance = max(rss / freedom, least**2)
-        return float(rss / variance + freedom * math.log(variance) + 2.0 * logdet), math.sqrt(variance), math.sqrt(rss / freedom)
+        value = float(rss / variance + freedom * math.log(variance) + 2.0 * logdet)
+        return value, math.sqrt(variance), math.sqrt(rss / freedom)
 
     powers = np.arange(math.log10(SLOWEST / len(y)), FASTEST + APART, APART)
     grid = [cost(power)[0] for power in powers]
@@ -223,12 +222,12 @@ def _fit(y: FloatArray, dt: FloatArray, drive: FloatArray, least: float) -> _Fit
 
 
 def _alike(motion: FloatArray, place: float) -> float:
-    """By how much slow rounding noise exceeds that of independent roundings: root of the quotient of the spectra.
+    """By how much slow rounding noise exceeds that of independent roundings: root of the quotient of their spectra.
 
-    Rounding to *place* is a sawtooth of the position, with harmonics of power place^2 / (2 pi^2 k^2) at frequencies of k
-    times speed over place. A speed that is distributed like a Gaussian of the motion's own root mean square puts a
-    density place^3 zeta(3) / (2 pi^2 sqrt(2 pi) speed) at frequency zero; independent roundings have
-    place^2 / 12 times the step. Slow against `place` per step, samples on one stair count as few.
+    Rounding to *place* is a sawtooth of the position: harmonics k of power place^2 / (2 pi^2 k^2) at frequencies of
+    k times speed over place. Speeds that are distributed like a Gaussian of the motion's own root mean square make of
+    that a density place^3 zeta(3) / (2 pi^2 sqrt(2 pi) speed) at frequency zero; independent roundings have
+    place^2 / 12 times the step. Where a motion takes many samples to a place, they count as few.
     """
     speed = float(np.sqrt(np.mean(np.diff(motion) ** 2)))
     if place == 0.0 or speed == 0.0:
