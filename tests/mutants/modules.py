@@ -1,0 +1,76 @@
+"""The core modules by group, and the tests that may notice a fault in them."""
+
+from __future__ import annotations
+
+from workbench.compiled import KERNEL_FILES
+
+from mutants.tree import ROOT
+
+PACKAGE = ROOT / "src" / "workbench"
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "robots": ("robots/**/*.py", "dry_friction.py"),
+    "reference": ("reference/**/*.py",),
+    "comparison": ("campaign/compare.py", "campaign/unloaded.py", "campaign/evidence.py", "campaign/kinematics.py",
+                   "campaign/platform.py", "campaign/torques.py"),
+    "verdict": ("campaign/verdict.py", "campaign/candidate_spec.py", "campaign/claims.py"),
+    "metrics": ("metrics.py",),
+    "mjcf": ("mjcf/**/*.py",),
+}  # fmt: skip
+"""Patterns of files, below the package."""
+
+CORE_TESTS = (
+    "asym_kernel", "asym_literal", "asym_mobility", "campaign_run", "campaign_spec", "closure_kinds", "counted_forces",
+    "errata", "friction", "fuzz_mechanisms", "idle_rods", "importing", "malformed_mechanisms", "mass_models", "metrics",
+    "mjcf_assumptions", "mjcf_edit", "mjcf_roundtrip", "mjcf_safety", "mjcf_setup", "mjcf_source", "model_command",
+    "models", "motion_along", "motion_platform", "negative_controls", "own_campaign", "own_reference",
+    "pinocchio_reference", "planar_4rprp", "planar_4rprp_model", "platform_side", "random_robots", "reactions",
+    "recorded", "reference_closure", "reference_dynamics", "reference_evidence", "reference_linear", "refusals",
+    "robot_file", "robot_folder", "screws", "second_engine_campaigns", "speed_semantics", "task_coordinates", "terms",
+    "tolerances", "urdf", "user_kinematics", "verdict",
+)  # fmt: skip
+
+ROBOT_KERNELS = {
+    "asym_2rss_ppap": ("asym_kernel", "asym_literal", "friction", "negative_controls", "speed_semantics"),
+    "planar_4rprp": ("planar_4rprp", "planar_4rprp_model", "friction", "negative_controls", "speed_semantics"),
+}
+REFERENCE_KERNELS = (
+    "reference_linear", "closure_kinds", "reactions", "motion_along", "fuzz_mechanisms", "own_reference",
+    "reference_dynamics", "malformed_mechanisms", "idle_rods", "terms", "reference_evidence",
+)  # fmt: skip
+PLATFORM_KERNELS = ("task_coordinates", "platform_side", "motion_platform")
+
+
+def files_of(group: str) -> list[str]:
+    """Files of a group, below the package."""
+    found = {path for pattern in GROUPS[group] for path in PACKAGE.glob(pattern)}
+    return sorted(path.relative_to(PACKAGE).as_posix() for path in found if path.name != "__init__.py")
+
+
+def is_kernel(module: str) -> bool:
+    """Whether a file is compiled to machine code, where no line can be watched."""
+    return module in KERNEL_FILES
+
+
+def kernel_tests(module: str) -> list[str]:
+    """Test files for a file with kernels, those that ask most of it first."""
+    for robot, names in ROBOT_KERNELS.items():
+        if robot in module:
+            return [test_file(name) for name in names]
+    if module.startswith("robots/"):
+        names = ("asym_kernel", "planar_4rprp", "planar_4rprp_model", "friction")
+    elif module.endswith(("task_rows.py", "platform_kernels.py")):
+        names = PLATFORM_KERNELS
+    else:
+        names = REFERENCE_KERNELS
+    return [test_file(name) for name in names]
+
+
+def test_file(name: str) -> str:
+    """Path of a test file, below the repository."""
+    return f"tests/test_{name}.py"
+
+
+def core_test_files() -> list[str]:
+    """The core tests that there are."""
+    return [test_file(name) for name in CORE_TESTS if (ROOT / test_file(name)).exists()]
