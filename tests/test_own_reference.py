@@ -61,6 +61,32 @@ def test_torques_of_excess_actuators_have_least_norm_and_do_the_same_work(
     assert balance.relative < 1e-9
 
 
+def test_dry_friction_of_each_excess_actuator_is_its_own(tmp_path: Path, single: MujocoReference) -> None:
+    crank, wrist, elbow = 0.7, 0.4, 0.3
+
+    def rubbing(**joints: float) -> MujocoReference:
+        text = FOURBAR
+        for name, loss in joints.items():
+            text = text.replace(f'<joint name="{name}"', f'<joint name="{name}" frictionloss="{loss}"')
+        return reference(tmp_path, text, ("crank", "wrist"), initial=GUESS)
+
+    one = whole_turn(single)
+    motion = one.qpos[:, [0, 2]], one.qvel[:, [0, 2]], one.qacc[:, [0, 2]]
+    qd = motion[1]
+    ways = np.where(np.abs(qd) > 1e-9, np.sign(qd), 0.0)
+    assert {-1.0, 1.0} <= set(ways[:, 1]), "the wrist turns back on the way"
+    smooth = rubbing().inverse_dynamics(*motion).tau
+    rough = rubbing(crank=crank, wrist=wrist)
+    added = rough.inverse_dynamics(*motion).tau - smooth
+    assert np.abs(added - ways * [crank, wrist]).max() < 1e-13
+    assert power_balance(rough, *motion).relative < 1e-9
+    # friction of a passive joint is work for both, shared like any other
+    shared = rubbing(elbow=elbow).inverse_dynamics(*motion).tau - smooth
+    work = elbow * np.abs(one.qvel[:, 1])
+    assert np.abs((shared * qd).sum(axis=1) - work).max() < 1e-13
+    assert np.abs(shared - qd * (work / (qd**2).sum(axis=1))[:, None]).max() < 1e-13
+
+
 @pytest.mark.parametrize("which", [0, 1, 2])
 def test_what_excess_actuators_cannot_do_together_is_refused(
     tmp_path: Path, single: MujocoReference, which: int
