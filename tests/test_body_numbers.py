@@ -1,4 +1,4 @@
-"""What the compiled model's numbers of a body mean: inertia in the axes of the body, whatever frame it is written in."""
+"""What the compiled model's numbers of a body mean: inertia in the body's axes, whatever frame it is written in."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def tumbling(quaternion: np.ndarray) -> mujoco.MjModel:
 
 
 @pytest.mark.parametrize(
-    "quaternion", [[1, 0, 0, 0], [0.5, 0.5, 0.5, 0.5], [0.5, -0.5, -0.5, -0.5], [0.6, 0.0, 0.8, 0.0], [0.1, -0.3, 0.5, 0.8]]
+    "quaternion",
+    [[1, 0, 0, 0], [0.5, 0.5, 0.5, 0.5], [0.5, -0.5, -0.5, -0.5], [0.6, 0.0, 0.8, 0.0], [0.1, -0.3, 0.5, 0.8]],
 )
 def test_inertia_in_the_axes_of_the_body(quaternion: list[float]) -> None:
     unit = np.array(quaternion) / np.linalg.norm(quaternion)

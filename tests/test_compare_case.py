@@ -39,9 +39,7 @@ def verdicts(result: CaseResult, candidate: str = "distributed") -> list[str]:
 
 
 @pytest.mark.parametrize(("name", "said"), [("x", "position"), ("xd", "velocity"), ("xdd", "acceleration")])
-def test_a_platform_that_moves_otherwise_fails_the_case(
-    campaign: tuple[Campaign, Case], name: str, said: str
-) -> None:
+def test_a_platform_that_moves_otherwise_fails_the_case(campaign: tuple[Campaign, Case], name: str, said: str) -> None:
     right = computed(campaign)
     assert (right.facts["status"], right.facts["message"]) == ("passed", None)
     # ten thousand times rounding, and nothing that a picture would show
@@ -85,7 +83,9 @@ def test_a_bound_of_the_case_counts_in_its_rows(tmp_path: Path) -> None:
     bounds = 'name = "first"\nbounds = { q2 = 0.5 }'
     text = HEAD + CANDIDATES + CASE.replace('name = "first"', bounds)
     # lumped masses against distributed ones are off by percents
-    text = text.replace('name = "lumped"\nreference = "distributed"', 'name = "lumped"\nreference = "distributed"\nbound = 1e-10')
+    text = text.replace(
+        'name = "lumped"\nreference = "distributed"', 'name = "lumped"\nreference = "distributed"\nbound = 1e-10'
+    )
     found = compute_case(*read(tmp_path / "small.toml", text), ERRORS_ONLY)
     rows = [row for row in found.rows if (row.candidate, row.reference) == ("lumped", "distributed")]
     assert [(row.joint, row.bound, row.verdict) for row in rows] == [

@@ -62,7 +62,8 @@ def test_every_figure_is_that_of_its_definition(seed: int) -> None:
 
 def test_the_floor_itself_is_looked_at() -> None:
     reference = np.array([100.0, 1.0, 0.999])
-    found = relative_error(reference + [0.0, 0.5, 0.5], reference)
+    off = np.array([0.0, 0.5, 0.5])
+    found = relative_error(reference + off, reference)
     assert found.pointwise_error == 0.5
     assert found.pointwise_skipped == 1
 

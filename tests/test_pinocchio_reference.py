@@ -350,9 +350,7 @@ def test_a_far_sample_stays_on_the_branch_of_the_home_pose(
 
 @needs_pinocchio
 @pytest.mark.parametrize("guard", ["", "CORRECTION", "LONGEST_STEP"])
-def test_branches_that_nearly_meet_are_told_apart(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, guard: str
-) -> None:
+def test_branches_that_nearly_meet_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, guard: str) -> None:
     """As in test_reference_closure.py: either guard alone is not enough."""
     if guard:
         monkeypatch.setattr(pinocchio_loops, guard, np.inf)

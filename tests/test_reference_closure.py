@@ -88,9 +88,7 @@ def test_one_sample_asked_for_alone_is_where_it_is_among_others(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("guard", ["", "CORRECTION", "LONGEST_STEP"])
-def test_branches_that_nearly_meet_are_told_apart(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, guard: str
-) -> None:
+def test_branches_that_nearly_meet_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, guard: str) -> None:
     """A tenth of a millimetre parts the branches where all bars are in line; every sample is reached past that."""
     if guard:
         monkeypatch.setattr(continuation, guard, np.inf)

@@ -148,7 +148,9 @@ def _try(planted: Planted) -> tuple[trial.Outcome, int]:
     text = tree.source_of(planted.module)
     with tree.planted(planted.module, planted.mutant.planted(text)):
         if modules.is_kernel(planted.module):
-            files = [name for name in modules.kernel_tests(planted.module) if any(t.startswith(name) for t in durations)]
+            files = [
+                name for name in modules.kernel_tests(planted.module) if any(t.startswith(name) for t in durations)
+            ]
             tests = [test for name in files for test in _by_speed(durations, failed, name)]
             expected = sum(durations[test] for test in tests)
             with tree.own_cache() as cache:

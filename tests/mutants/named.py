@@ -103,3 +103,6 @@ NAMED: dict[str, Named] = {
     "NaN of the platform's side not seen": Named(PLATFORM, "            if math.isnan(value):\n                worst = math.inf\n", ""),
     "NaN in free closure not seen": Named(CLOSURE, "            if not np.isfinite(residual):\n                break\n", ""),
 }  # fmt: skip
+
+EQUIVALENT: dict[str, str] = {}
+"""Named faults that no input can show, with the reason."""

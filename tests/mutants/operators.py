@@ -132,54 +132,54 @@ class _Finder(ast.NodeVisitor):
 
     # what is not entered: texts, types, decorators
 
-    def visit_JoinedStr(self, node: ast.JoinedStr) -> None:  # noqa: N802
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> None:
         """Texts say, they do not compute."""
 
-    def visit_Raise(self, node: ast.Raise) -> None:  # noqa: N802
+    def visit_Raise(self, node: ast.Raise) -> None:
         self._plant("statement", node, "pass")
 
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:  # noqa: N802
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         for default in (*node.args.defaults, *node.args.kw_defaults):
             if default is not None:
                 self.visit(default)
         for statement in node.body:
             self.visit(statement)
 
-    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:  # noqa: N802
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
         if node.value is not None:
             self.visit(node.value)
 
     # statements
 
-    def visit_Expr(self, node: ast.Expr) -> None:  # noqa: N802
+    def visit_Expr(self, node: ast.Expr) -> None:
         if isinstance(node.value, ast.Constant):
             return
         if isinstance(node.value, ast.Call):
             self._plant("statement", node, "pass")
         self.generic_visit(node)
 
-    def visit_Assign(self, node: ast.Assign) -> None:  # noqa: N802
+    def visit_Assign(self, node: ast.Assign) -> None:
         if any(isinstance(target, ast.Name) and target.id == "__all__" for target in node.targets):
             return
         if all(isinstance(target, ast.Subscript | ast.Attribute) for target in node.targets):
             self._plant("statement", node, "pass")
         self.generic_visit(node)
 
-    def visit_AugAssign(self, node: ast.AugAssign) -> None:  # noqa: N802
+    def visit_AugAssign(self, node: ast.AugAssign) -> None:
         self._plant("statement", node, "pass")
         if type(node.op) in ARITHMETIC:
             self._between("arithmetic", node.target, node.value, ARITHMETIC[type(node.op)] + "=")
         self.generic_visit(node)
 
-    def visit_Continue(self, node: ast.Continue) -> None:  # noqa: N802
+    def visit_Continue(self, node: ast.Continue) -> None:
         self._plant("statement", node, "pass")
 
-    def visit_Return(self, node: ast.Return) -> None:  # noqa: N802
+    def visit_Return(self, node: ast.Return) -> None:
         if node.value is not None and not (isinstance(node.value, ast.Constant) and node.value.value is None):
             self._plant("return", node, "return None")
         self.generic_visit(node)
 
-    def visit_If(self, node: ast.If) -> None:  # noqa: N802
+    def visit_If(self, node: ast.If) -> None:
         if isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
             return
         self._negated(node.test)
@@ -187,7 +187,7 @@ class _Finder(ast.NodeVisitor):
 
     # expressions
 
-    def visit_IfExp(self, node: ast.IfExp) -> None:  # noqa: N802
+    def visit_IfExp(self, node: ast.IfExp) -> None:
         self._negated(node.test)
         self.generic_visit(node)
 
@@ -196,20 +196,20 @@ class _Finder(ast.NodeVisitor):
             self._negated(condition)
         self.generic_visit(node)
 
-    def visit_Compare(self, node: ast.Compare) -> None:  # noqa: N802
+    def visit_Compare(self, node: ast.Compare) -> None:
         left: ast.expr = node.left
         for sign, right in zip(node.ops, node.comparators, strict=True):
             self._between("comparison", left, right, COMPARISONS[type(sign)])
             left = right
         self.generic_visit(node)
 
-    def visit_BoolOp(self, node: ast.BoolOp) -> None:  # noqa: N802
+    def visit_BoolOp(self, node: ast.BoolOp) -> None:
         after = "or" if isinstance(node.op, ast.And) else "and"
         for left, right in zip(node.values, node.values[1:], strict=False):
             self._between("logic", left, right, after)
         self.generic_visit(node)
 
-    def visit_BinOp(self, node: ast.BinOp) -> None:  # noqa: N802
+    def visit_BinOp(self, node: ast.BinOp) -> None:
         text = isinstance(node.left, ast.Constant | ast.JoinedStr) and not isinstance(
             getattr(node.left, "value", None), int | float
         )
@@ -217,21 +217,21 @@ class _Finder(ast.NodeVisitor):
             self._between("arithmetic", node.left, node.right, ARITHMETIC[type(node.op)])
         self.generic_visit(node)
 
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> None:  # noqa: N802
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> None:
         if isinstance(node.op, ast.USub):
             self._plant("sign", node, f"({self._source(node.operand)})")
         elif isinstance(node.op, ast.Not):
             self._plant("condition", node, f"bool({self._source(node.operand)})")
         self.generic_visit(node)
 
-    def visit_Constant(self, node: ast.Constant) -> None:  # noqa: N802
+    def visit_Constant(self, node: ast.Constant) -> None:
         value = node.value
         if isinstance(value, bool):
             self._plant("constant", node, str(not value))
         elif isinstance(value, int | float):
             self._plant("constant", node, f"100 * {self._source(node)}" if value else "1")
 
-    def visit_Subscript(self, node: ast.Subscript) -> None:  # noqa: N802
+    def visit_Subscript(self, node: ast.Subscript) -> None:
         self.visit(node.value)
         parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         for part in parts:
@@ -243,13 +243,11 @@ class _Finder(ast.NodeVisitor):
                 elif bound is not None and not isinstance(bound, ast.Constant):
                     self.visit(bound)
 
-    def visit_Call(self, node: ast.Call) -> None:  # noqa: N802
+    def visit_Call(self, node: ast.Call) -> None:
         name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
         if name in SWAPPED:
             start, stop = self._span(node.func)
-            self.found.append(
-                Mutant("swapped", node.func.end_lineno or 0, stop - len(name), stop, name, SWAPPED[name])
-            )
+            self.found.append(Mutant("swapped", node.func.end_lineno or 0, stop - len(name), stop, name, SWAPPED[name]))
         first, second = (*node.args[:2], None, None)[:2]
         if first is not None and second is not None and name not in {"isinstance", "getattr", "max", "min", "zip"}:
             one, other = self._source(first), self._source(second)

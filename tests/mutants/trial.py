@@ -127,7 +127,7 @@ def _run(tests: list[str], cache: Path, limit: int, plugins: tuple[Any, ...], st
         stamp_by_parts(COPY / "src" / "workbench")
         options = ["-q", "-n", "0", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]
         code = int(pytest.main([*tests, *options, *(["-x"] if stop else [])], plugins=[_FirstFailure(log), *plugins]))
-    except BaseException:  # noqa: BLE001
+    except BaseException:
         traceback.print_exc()
     finally:
         sys.stdout.flush()
@@ -173,5 +173,7 @@ def kernel_files(package: Path, module: str) -> set[str]:
         for node in ast.walk(ast.parse((package / name).read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("workbench."):
                 inner = (node.module or "").removeprefix("workbench.").replace(".", "/")
-                open_ += [f for f in (f"{inner}.py", *(f"{inner}/{a.name}.py" for a in node.names)) if f in KERNEL_FILES]
+                open_ += [
+                    f for f in (f"{inner}.py", *(f"{inner}/{a.name}.py" for a in node.names)) if f in KERNEL_FILES
+                ]
     return found
