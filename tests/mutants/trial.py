@@ -116,9 +116,8 @@ def _run(tests: list[str], cache: Path, limit: int, plugins: tuple[Any, ...], st
         os.chdir(COPY)
         source = str(COPY / "src")
         sys.path[:] = [source, *(place for place in sys.path if not place.endswith(("/tests", "/src")))]
-        for name in [name for name in sys.modules if name.split(".")[0] == "mutants"]:
-            if name != "mutants.trial":
-                del sys.modules[name]
+        if "workbench" in sys.modules:
+            raise RuntimeError("the package was imported before its copy could be")
         os.environ |= {"PYTHONPATH": source, "NUMBA_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": ""}
         import numba
         import pytest
@@ -127,6 +126,8 @@ def _run(tests: list[str], cache: Path, limit: int, plugins: tuple[Any, ...], st
         stamp_by_parts(COPY / "src" / "workbench")
         options = ["-q", "-n", "0", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]
         code = int(pytest.main([*tests, *options, *(["-x"] if stop else [])], plugins=[_FirstFailure(log), *plugins]))
+        if not str(sys.modules["workbench"].__file__).startswith(source):
+            raise RuntimeError(f"another copy was tested: {sys.modules['workbench'].__file__}")
     except BaseException:
         traceback.print_exc()
     finally:
