@@ -9,6 +9,7 @@ import random
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from mutants import modules, tree, trial
 from mutants.named import NAMED
@@ -17,6 +18,8 @@ from mutants.reached import Reached
 
 PLACE = tree.COPY.parent
 REACHED = PLACE / "reached.json"
+INTERPRETED = PLACE / "reached-interpreted.json"
+"""the same with kernels that are not compiled, so that their lines are seen"""
 RESULTS = PLACE / "results.jsonl"
 BASELINE_LIMIT = 3600
 """seconds of the processor for the core tests without a fault"""
@@ -48,9 +51,12 @@ def main() -> int:
     tree.renew()
     trial.warm()
     if options.reach or not REACHED.exists():
-        _reach(options.tests or modules.core_test_files())
-    known = {entry["key"]: entry for entry in _results()}
+        _reach(options.tests or modules.core_test_files(), REACHED)
     chosen = list(_chosen(options))
+    kernels = any(modules.is_kernel(planted.module) for planted in chosen)
+    if options.reach_kernels or (kernels and not INTERPRETED.exists()):
+        _reach([modules.test_file(name) for name in modules.INTERPRETED_TESTS], INTERPRETED)
+    known = {entry["key"]: entry for entry in _results()}
     for number, planted in enumerate(chosen, 1):
         before = known.get(planted.key)
         if before and (before["status"] == trial.KILLED or not options.again):
@@ -81,6 +87,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--line", type=int, help="faults of this line alone")
     parser.add_argument("--again", action="store_true", help="try again what survived before")
     parser.add_argument("--reach", action="store_true", help="find anew which tests reach which lines")
+    parser.add_argument("--reach-kernels", action="store_true", help="the same for kernels, uncompiled")
     parser.add_argument("--tests", nargs="*", help="test files for --reach; default: the core tests")
     parser.add_argument("--list", action="store_true", help="show the faults, plant none")
     return parser.parse_args()
@@ -118,17 +125,17 @@ def _list(options: argparse.Namespace) -> int:
     return 0
 
 
-def _reach(files: list[str]) -> None:
+def _reach(files: list[str], place: Path) -> None:
     """Run tests without a fault; what is known of other test files is kept."""
     print(f"running {len(files)} test files without a fault", flush=True)
     out = PLACE / "reached-now.json"
     out.unlink(missing_ok=True)
     plugin = Reached(tree.COPY / "src" / "workbench", out)
-    outcome = trial.trial(files, tree.CACHE, BASELINE_LIMIT, (plugin,), stop=False)
+    outcome = trial.trial(files, tree.CACHE, BASELINE_LIMIT, (plugin,), stop=False, interpreted=place == INTERPRETED)
     if not out.exists():
         sys.exit(f"mutants: the tests did not run: {outcome}; see {PLACE / 'last.log'}")
     new = json.loads(out.read_text(encoding="utf-8"))
-    old = json.loads(REACHED.read_text(encoding="utf-8")) if REACHED.exists() else {"lines": {}, "durations": {}}
+    old = json.loads(place.read_text(encoding="utf-8")) if place.exists() else {"lines": {}, "durations": {}}
     ran = tuple(f"{name}::" for name in files)
     for module, lines in old["lines"].items():
         mine = new["lines"].setdefault(module, {})
@@ -138,46 +145,47 @@ def _reach(files: list[str]) -> None:
                 mine[line] = sorted({*mine.get(line, []), *kept})
     kept = {test: time for test, time in old["durations"].items() if not test.startswith(ran)}
     new["durations"] = kept | new["durations"]
-    REACHED.write_text(json.dumps(new), encoding="utf-8")
+    place.write_text(json.dumps(new), encoding="utf-8")
     print(f"{len(new['durations'])} tests, {sum(new['durations'].values()):.0f} s; failed: {new['failed'] or 'none'}")
 
 
 def _try(planted: Planted) -> tuple[trial.Outcome, int]:
-    reached = json.loads(REACHED.read_text(encoding="utf-8"))
-    durations, failed = reached["durations"], set(reached["failed"])
+    kernel = modules.is_kernel(planted.module)
     text = tree.source_of(planted.module)
     with tree.planted(planted.module, planted.mutant.planted(text)):
-        if modules.is_kernel(planted.module):
-            files = [
-                name for name in modules.kernel_tests(planted.module) if any(t.startswith(name) for t in durations)
-            ]
-            tests = [test for name in files for test in _by_speed(durations, failed, name)]
-            expected = sum(durations[test] for test in tests)
-            with tree.own_cache() as cache:
-                return trial.trial(tests, cache, int(3 * expected) + COMPILING), len(tests)
-        lines = reached["lines"].get(planted.module, {})
-        last = planted.mutant.line + planted.mutant.before.count("\n")
-        seen = {test for line in range(planted.mutant.line, last + 1) for test in lines.get(str(line), [])} - failed
-        at_import = "" in seen
+        outcome, tried = _try_reaching(planted, INTERPRETED if kernel else REACHED)
+        if not kernel or outcome.status != trial.SURVIVED:
+            return outcome, tried
+        files = set(modules.kernel_tests(planted.module))
+        durations = json.loads(REACHED.read_text(encoding="utf-8"))["durations"]
+        limit = COMPILING + int(3 * sum(time for test, time in durations.items() if test.split("::")[0] in files))
+        with tree.own_cache() as cache:
+            second = trial.trial(modules.kernel_tests(planted.module), cache, limit)
+        return trial.Outcome(second.status, second.by, outcome.seconds + second.seconds), tried + len(files)
+
+
+def _try_reaching(planted: Planted, place: Path) -> tuple[trial.Outcome, int]:
+    """Run the tests that reach a fault, then the rest of their files; the outcome, and how many tests there were."""
+    reached = json.loads(place.read_text(encoding="utf-8"))
+    durations, failed = reached["durations"], set(reached["failed"])
+    lines = reached["lines"].get(planted.module, {})
+    last = planted.mutant.line + planted.mutant.before.count("\n")
+    seen = {test for line in range(planted.mutant.line, last + 1) for test in lines.get(str(line), [])} - failed
+    files = {test.split("::")[0] for test in seen if test}
+    if "" in seen:  # run when the module is imported
+        files |= {test.split("::")[0] for tests in lines.values() for test in tests if test}
         seen.discard("")
-        ordered = sorted(seen, key=lambda test: (durations.get(test, 0.0), test))
-        outcome = trial.Outcome(trial.SURVIVED, "", 0.0)
-        if ordered:
-            limit = int(3 * sum(durations.get(test, 0.0) for test in ordered)) + 60
-            outcome = trial.trial(ordered, tree.CACHE, limit)
-        if outcome.status != trial.SURVIVED:
-            return outcome, len(ordered)
-        # a fixture that several tests share is known by the first of them alone, what runs at import by none
-        files = {test.split("::")[0] for test in seen}
-        if at_import:
-            files |= {test.split("::")[0] for tests in lines.values() for test in tests if test}
-        more = [test for name in sorted(files) for test in _by_speed(durations, failed, name) if test not in seen]
-        if not more:
-            return outcome, len(ordered)
-        limit = int(3 * sum(durations[test] for test in more)) + 60
-        second = trial.trial(more, tree.CACHE, limit)
-        spent = trial.Outcome(second.status, second.by, outcome.seconds + second.seconds)
-        return spent, len(ordered) + len(more)
+    # a fixture that several tests share is known by the first of them alone, what runs at import by none
+    more = [test for name in sorted(files) for test in _by_speed(durations, failed, name) if test not in seen]
+    spent, tried = 0.0, 0
+    for tests in (sorted(seen, key=lambda test: (durations.get(test, 0.0), test)), more):
+        if tests:
+            limit = int(3 * sum(durations.get(test, 0.0) for test in tests)) + 60
+            outcome = trial.trial(tests, tree.CACHE, limit, interpreted=place == INTERPRETED)
+            spent, tried = spent + outcome.seconds, tried + len(tests)
+            if outcome.status != trial.SURVIVED:
+                return trial.Outcome(outcome.status, outcome.by, spent), tried
+    return trial.Outcome(trial.SURVIVED, "", spent), tried
 
 
 def _by_speed(durations: dict[str, float], failed: set[str], file: str) -> list[str]:

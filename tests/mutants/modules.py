@@ -18,7 +18,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
 """Patterns of files, below the package."""
 
 CORE_TESTS = (
-    "asym_kernel", "asym_literal", "asym_mobility", "body_numbers", "campaign_run", "campaign_spec", "closure_kinds",
+    "agreement", "asym_kernel", "asym_literal", "asym_mobility", "body_numbers", "campaign_run", "campaign_spec", "closure_kinds",
     "compare_case", "counted_forces", "errata", "friction", "fuzz_mechanisms", "idle_rods", "importing",
     "malformed_mechanisms", "mass_models", "metrics", "mjcf_assumptions", "mjcf_edit", "mjcf_roundtrip",
     "mjcf_safety", "mjcf_setup", "mjcf_source", "model_command", "models", "motion_along", "motion_platform",
@@ -29,15 +29,21 @@ CORE_TESTS = (
     "user_kinematics", "verdict",
 )  # fmt: skip
 
-ROBOT_KERNELS = {
-    "asym_2rss_ppap": ("asym_kernel", "asym_literal", "friction", "negative_controls", "speed_semantics"),
-    "planar_4rprp": ("planar_4rprp", "planar_4rprp_model", "friction", "negative_controls", "speed_semantics"),
-}
-REFERENCE_KERNELS = (
-    "reference_linear", "closure_kinds", "reactions", "motion_along", "fuzz_mechanisms", "own_reference",
-    "reference_dynamics", "malformed_mechanisms", "idle_rods", "terms", "reference_evidence",
-)  # fmt: skip
-PLATFORM_KERNELS = ("task_coordinates", "platform_side", "motion_platform")
+KERNEL_TESTS: dict[str, tuple[str, ...]] = {
+    "robots/asym_2rss_ppap/": ("asym_kernel", "asym_literal", "friction"),
+    "robots/planar_4rprp/": ("planar_4rprp", "planar_4rprp_model", "friction"),
+    "robots/": ("asym_kernel", "planar_4rprp", "friction"),
+    "reference/platform_kernels": ("task_coordinates", "platform_side"),
+    "reference/task_rows": ("task_coordinates", "platform_side"),
+    "reference/": (
+        "reference_linear", "closure_kinds", "own_reference", "reactions", "idle_rods", "counted_forces",
+        "fuzz_mechanisms", "reference_dynamics",
+    ),
+}  # fmt: skip
+"""Beginnings of the names of files with kernels, the first that fits: tests of the compiled kernels."""
+
+INTERPRETED_TESTS = ("reference_linear", "closure_kinds", "own_reference", "reactions", "idle_rods", "task_coordinates")
+"""Small enough to run with all kernels uncompiled."""
 
 
 def files_of(group: str) -> list[str]:
@@ -54,16 +60,9 @@ def is_kernel(module: str) -> bool:
 
 def kernel_tests(module: str) -> list[str]:
     """Test files for a file with kernels, those that ask most of it first."""
-    for robot, names in ROBOT_KERNELS.items():
-        if robot in module:
-            return [test_file(name) for name in names]
-    if module.startswith("robots/"):
-        names = ("asym_kernel", "planar_4rprp", "planar_4rprp_model", "friction")
-    elif module.endswith(("task_rows.py", "platform_kernels.py")):
-        names = PLATFORM_KERNELS
-    else:
-        names = REFERENCE_KERNELS
-    return [test_file(name) for name in names]
+    return [
+        test_file(name) for name in next(tests for start, tests in KERNEL_TESTS.items() if module.startswith(start))
+    ]
 
 
 def test_file(name: str) -> str:

@@ -54,6 +54,7 @@ NAMED: dict[str, Named] = {
     "structure not checked": Named(LOAD, "    _check(described, model, file, text, None)\n", ""),
     "numbers not checked": Named(LOAD, "    _check(described, model, file, text, values, elements)\n    computed", "    computed"),
     "edited numbers not checked": Named(LOAD, "    _check(described, model, file, text, values, elements)\n    return", "    return"),
+    "places that disagree not refused": Named(LOAD, "    elif values is not None and elements is not None:", "    elif False:"),
     "rank of a pose not tested": Named(REFERENCE, "bad = (rank < len(structure.passive)) | ~(", "bad = ~("),
     "speed of a pose not tested": Named(REFERENCE, "bad = (rank < len(structure.passive)) | ~(residual <= self._closer.tolerance.velocity * speed)", "bad = rank < len(structure.passive)"),
     "NaN speed passes": Named(REFERENCE, "| ~(residual <= self._closer.tolerance.velocity * speed)", "| (residual > self._closer.tolerance.velocity * speed)"),

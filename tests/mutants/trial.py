@@ -55,14 +55,24 @@ def warm() -> None:
             continue
 
 
-def trial(tests: Iterable[str], cache: Path, limit: int, plugins: tuple[Any, ...] = (), stop: bool = True) -> Outcome:
-    """Run tests in a fork until the first fails; *limit* in seconds of the processor."""
+def trial(
+    tests: Iterable[str],
+    cache: Path,
+    limit: int,
+    plugins: tuple[Any, ...] = (),
+    stop: bool = True,
+    interpreted: bool = False,
+) -> Outcome:
+    """Run tests in a fork until the first fails; *limit* in seconds of the processor.
+
+    *interpreted*: the reference's kernels stay Python, which is slow, and still faster than compiling them.
+    """
     log = COPY.parent / "last.json"
     log.unlink(missing_ok=True)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     child = os.fork()
     if child == 0:
-        _run(list(tests), cache, limit, plugins, stop, log)
+        _run(list(tests), cache, limit, plugins, stop, log, interpreted)
     status = _wait(child, 10 * limit)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
@@ -105,7 +115,9 @@ class _FirstFailure:
             self.log.write_text(json.dumps({"failed": f"{report.nodeid} (import)"}))
 
 
-def _run(tests: list[str], cache: Path, limit: int, plugins: tuple[Any, ...], stop: bool, log: Path) -> None:
+def _run(
+    tests: list[str], cache: Path, limit: int, plugins: tuple[Any, ...], stop: bool, log: Path, interpreted: bool
+) -> None:
     code = 3
     try:
         os.setpgid(0, 0)
@@ -124,6 +136,8 @@ def _run(tests: list[str], cache: Path, limit: int, plugins: tuple[Any, ...], st
 
         numba.config.CACHE_DIR = str(cache)
         stamp_by_parts(COPY / "src" / "workbench")
+        if interpreted:
+            interpret()
         options = ["-q", "-n", "0", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]
         code = int(pytest.main([*tests, *options, *(["-x"] if stop else [])], plugins=[_FirstFailure(log), *plugins]))
         if not str(sys.modules["workbench"].__file__).startswith(source):
@@ -134,6 +148,13 @@ def _run(tests: list[str], cache: Path, limit: int, plugins: tuple[Any, ...], st
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)
+
+
+def interpret() -> None:
+    """Leave kernels uncompiled from here on."""
+    from workbench import compiled
+
+    compiled.compiled = compiled.inlined = lambda function: function
 
 
 def stamp_by_parts(package: Path) -> None:
