@@ -111,6 +111,18 @@ def test_a_parallelogram_driven_at_both_cranks_shares_the_load_evenly(tmp_path: 
     assert np.abs(tau[:, 0] - expected).max() < 1e-12
 
 
+@pytest.mark.parametrize("rate", [0.0, 2.0])
+def test_a_parallelogram_laid_flat_is_refused_even_at_rest(tmp_path: Path, rate: float) -> None:
+    """Flat, it may go on as an antiparallelogram: the loops close to rounding there, and determine nothing."""
+    one = reference(tmp_path, PARALLELOGRAM, ("left",), initial=(("left", 1.0), ("right", 1.0), ("hinge", -1.0)))
+    q = np.array([[0.5], [0.0]])
+    for short in (0.5, 1e-3):  # a thousandth short of it all is well
+        near = one.inverse_dynamics([[short]], [[rate]], [[0.0]])
+        assert np.abs(near.qpos - [short, -short, short]).max() < 1e-12
+    with pytest.raises(MotionError, match=r"^sample 1, joint (hinge|right): singular pose at left = 0;"):
+        one.inverse_dynamics(q, np.full_like(q, rate), 0 * q)
+
+
 ROD = '<geom type="capsule" fromto="0 0 0 .5 0 0" size=".01" mass=".5"/>'
 RSSR = f"""<mujoco><compiler angle="radian"/><option><flag contact="disable"/></option><worldbody>
  <body name="crank"><joint name="crank"/><geom type="capsule" fromto="0 0 0 .1 0 0" size=".01" mass=".3"/>
