@@ -11,8 +11,10 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import numpy as np
+
 from mutants import modules, tree, trial
-from mutants.named import NAMED
+from mutants.named import EQUIVALENT, NAMED
 from mutants.operators import Mutant, compiles, mutants_of
 from mutants.reached import Reached
 
@@ -61,7 +63,7 @@ def main() -> int:
         before = known.get(planted.key)
         if before and (before["status"] == trial.KILLED or not options.again):
             continue
-        outcome, tests = _try(planted)
+        outcome, tests = _try(planted, options.budget)
         entry = {"key": planted.key, "group": planted.group, "module": planted.module, **asdict(planted.mutant),
                  **asdict(outcome), "tests": tests}  # fmt: skip
         known[planted.key] = entry
@@ -83,6 +85,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--only", default="", help="files, or names of named faults, that hold this text")
     parser.add_argument("--count", type=int, default=20, help="faults drawn from each group")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--budget", type=float, default=60.0, help="seconds of tests a fault has to survive")
     parser.add_argument("--operator", default="", help="this operator alone")
     parser.add_argument("--line", type=int, help="faults of this line alone")
     parser.add_argument("--again", action="store_true", help="try again what survived before")
@@ -96,7 +99,7 @@ def _options() -> argparse.Namespace:
 def _chosen(options: argparse.Namespace) -> Iterator[Planted]:
     if options.named:
         for name, one in NAMED.items():
-            if options.only in name or options.only in one.module:
+            if (options.only in name or options.only in one.module) and (name not in EQUIVALENT or options.again):
                 yield Planted(name, one.module, one.mutant(tree.source_of(one.module)))
         return
     for group in options.group or modules.GROUPS:
@@ -149,11 +152,11 @@ def _reach(files: list[str], place: Path) -> None:
     print(f"{len(new['durations'])} tests, {sum(new['durations'].values()):.0f} s; failed: {new['failed'] or 'none'}")
 
 
-def _try(planted: Planted) -> tuple[trial.Outcome, int]:
+def _try(planted: Planted, budget: float) -> tuple[trial.Outcome, int]:
     kernel = modules.is_kernel(planted.module)
     text = tree.source_of(planted.module)
     with tree.planted(planted.module, planted.mutant.planted(text)):
-        outcome, tried = _try_reaching(planted, INTERPRETED if kernel else REACHED)
+        outcome, tried = _try_reaching(planted, INTERPRETED if kernel else REACHED, budget)
         if not kernel or outcome.status != trial.SURVIVED:
             return outcome, tried
         files = set(modules.kernel_tests(planted.module))
@@ -164,8 +167,11 @@ def _try(planted: Planted) -> tuple[trial.Outcome, int]:
         return trial.Outcome(second.status, second.by, outcome.seconds + second.seconds), tried + len(files)
 
 
-def _try_reaching(planted: Planted, place: Path) -> tuple[trial.Outcome, int]:
-    """Run the tests that reach a fault, then the rest of their files; the outcome, and how many tests there were."""
+def _try_reaching(planted: Planted, place: Path, budget: float) -> tuple[trial.Outcome, int]:
+    """Run the tests that reach a fault, then the rest of their files, the fastest first, until the budget is spent.
+
+    Returns the outcome and how many tests there were.
+    """
     reached = json.loads(place.read_text(encoding="utf-8"))
     durations, failed = reached["durations"], set(reached["failed"])
     lines = reached["lines"].get(planted.module, {})
@@ -178,7 +184,10 @@ def _try_reaching(planted: Planted, place: Path) -> tuple[trial.Outcome, int]:
     # a fixture that several tests share is known by the first of them alone, what runs at import by none
     more = [test for name in sorted(files) for test in _by_speed(durations, failed, name) if test not in seen]
     spent, tried = 0.0, 0
-    for tests in (sorted(seen, key=lambda test: (durations.get(test, 0.0), test)), more):
+    for stage in (sorted(seen, key=lambda test: (durations.get(test, 0.0), test)), more):
+        total = np.cumsum([durations.get(test, 0.0) for test in stage])
+        tests = stage[: int(np.searchsorted(total, budget)) + 1] if budget > 0.0 else []
+        budget -= float(total[-1]) if stage else 0.0
         if tests:
             limit = int(3 * sum(durations.get(test, 0.0) for test in tests)) + 60
             outcome = trial.trial(tests, tree.CACHE, limit, interpreted=place == INTERPRETED)

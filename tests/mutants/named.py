@@ -105,5 +105,10 @@ NAMED: dict[str, Named] = {
     "NaN in free closure not seen": Named(CLOSURE, "            if not np.isfinite(residual):\n                break\n", ""),
 }  # fmt: skip
 
-EQUIVALENT: dict[str, str] = {}
+EQUIVALENT: dict[str, str] = {
+    "NaN in free closure not seen": "numbers of a model are finite and at most 1e10 when it is loaded, and steps are at most"
+    " 0.2 long, so no residual of a free closure is NaN; a second line of defence",
+    "NaN of the platform's side not seen": "configurations that come here are closed, so their rows are finite, and rates"
+    " are finite by the checks of arguments; a second line of defence",
+}
 """Named faults that no input can show, with the reason."""
