@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
@@ -18,6 +16,14 @@ from rich.table import Table
 from rich.text import Text
 
 from workbench.campaign.compare import Row
+from workbench.campaign.conclusion import (
+    FAILED,
+    INCOMPLETE,
+    NOTHING_JUDGED,
+    PASSED,
+    UNDECIDED_RUN,
+    Conclusion,
+)
 from workbench.campaign.run import Outcome
 from workbench.campaign.verdict import (
     AGREES,
@@ -59,6 +65,13 @@ STYLES = {
     DIFFERS: "yellow", PASS: "green", AGREES: "green", MEASURED: "cyan",
 }  # fmt: skip
 """Colour of each verdict; a row of the table shows the first of them that one of its joints has."""
+
+
+CONCLUSIONS = {
+    PASSED: "bold green", FAILED: "bold red", UNDECIDED_RUN: "bold magenta", INCOMPLETE: "bold yellow",
+    NOTHING_JUDGED: "bold cyan",
+}  # fmt: skip
+"""Colour of each verdict on a run: green where every bound holds, and nowhere else."""
 
 
 class _Bar:
@@ -151,7 +164,7 @@ def print_outcome(outcome: Outcome) -> None:
         measured, claimed = _quantity(claim["measured"], claim["unit"]), _quantity(claim["claimed"], claim["unit"])
         out.print(Text(f"  not confirmed: {claim['text']}: measured {measured}, printed {claimed} ({claim['source']})"))
     _print_diagnosis(manifest.get("diagnosis", {}))
-    out.print(_verdict(outcome))
+    print_conclusion(outcome.conclusion)
     out.print(Text(f"Report: {outcome.directory / 'report.html'}"), soft_wrap=True)
 
 
@@ -199,28 +212,9 @@ def _print_diagnosis(diagnosis: dict[str, Any]) -> None:
         out.print(Text(f"  {found['command']}", style="dim"), soft_wrap=True)
 
 
-def _verdict(outcome: Outcome) -> Text:
-    cases = outcome.manifest["cases"]
-    verdicts = Counter(row.verdict for row in outcome.rows)
-    checks, declared = (
-        verdicts[PASS] + verdicts[FAIL] + verdicts[UNDECIDED],
-        verdicts[EXPECTED_FAIL] + verdicts[UNEXPECTED_PASS],
-    )
-    if outcome.passed:
-        worst = max((row.peak_error for row in outcome.rows if row.verdict == PASS), default=math.nan)
-        within = f"{checks} checks in {len(cases)} {'case' if len(cases) == 1 else 'cases'} within their bounds"
-        parts = [f"{within}; largest error {worst:.2g}"] if checks else []
-        parts += [f"{declared} declared failures seen"] if declared else []
-        return Text(f"PASSED: {'; '.join(parts) or 'nothing to judge'}.", style="bold green")
-    parts = [f"{verdicts[FAIL]} of {checks} checks beyond their bounds"] if verdicts[FAIL] else []
-    if verdicts[UNDECIDED]:
-        parts.append(
-            f"{verdicts[UNDECIDED]} undecided: the reference's own uncertainty is not below a tenth of the bound"
-        )
-    if verdicts[UNEXPECTED_PASS]:
-        parts.append(f"{verdicts[UNEXPECTED_PASS]} of {declared} declared failures did not happen")
-    names = ", ".join(name for name, case in cases.items() if case["status"] != "passed")
-    return Text(f"FAILED: {'; '.join([*parts, f'cases: {names}'])}.", style="bold red")
+def print_conclusion(found: Conclusion) -> None:
+    """Print the verdict on a run, in the colour of its status."""
+    out.print(Text(found.text, style=CONCLUSIONS[found.status]), soft_wrap=True)
 
 
 def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any) -> Table:

@@ -276,7 +276,8 @@ def case_on(
         else:
             motion = planned
         x, xd, xdd = robot.platform_along(motion.t, motion.q, motion.qd, motion.qdd)
-        robot.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
+        if robot.closed_form is not None:  # else the reference has just computed these torques
+            robot.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
     except MotionError as error:
         raise with_unit_hint(at_time(error, planned.t), robot) from error
     force = np.tile(np.array(spec.external_force), (len(motion.t), 1))

@@ -15,6 +15,7 @@ from workbench.campaign import store
 from workbench.campaign.cases import Case, resolve_cases, with_unit_hint
 from workbench.campaign.claims import judge_claims
 from workbench.campaign.compare import RAW_DESCRIPTION, RAW_INVERSE, CaseResult, Row, compute_case
+from workbench.campaign.conclusion import CaseOutcome, Conclusion, case_status, conclude
 from workbench.campaign.cost import cost_us
 from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.lock import locked
@@ -28,12 +29,17 @@ from workbench.staging import check_output, staged
 
 @dataclass(frozen=True)
 class Outcome:
-    """A finished run: where it lies, whether every bound holds, and the rows."""
+    """A finished run: where it lies, the verdict on it, and the rows."""
 
     directory: Path
-    passed: bool
+    conclusion: Conclusion
     rows: list[Row]
     manifest: dict[str, Any]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every bound holds; not where nothing was held against one."""
+        return self.conclusion.passed
 
 
 class Pictures(Protocol):
@@ -148,14 +154,15 @@ def run_campaign(
         if progress:
             progress("", len(cases), len(cases))
         rows = [row for result in results for row in result.rows]
-        facts = {result.name: result.facts for result in results}
-        passed = all(f["status"] == "passed" for f in facts.values())
+        facts = {result.name: _judged(result) for result in results}
+        conclusion = conclude(rows, {name: _outcome(found) for name, found in facts.items()})
         manifest = _manifest(campaign, file, cases, facts, rows) | {
             "command": shlex.join(command),
             "started": started.isoformat(timespec="seconds"),
             "finished": datetime.now(UTC).isoformat(timespec="seconds"),
             "seconds": round(time.perf_counter() - clock, 3),
-            "status": "passed" if passed else "failed",
+            "status": conclusion.status,
+            "verdict": conclusion.sentence,
             "engines": list(effort.engines),
             "budget": effort.budget,
         }
@@ -173,7 +180,21 @@ def run_campaign(
             f" {said.replace(str(stage), str(directory))}; workbench report {directory} tries again",
             path=str(directory),
         ) from failure
-    return Outcome(directory, passed, rows, manifest)
+    return Outcome(directory, conclusion, rows, manifest)
+
+
+def _judged(result: CaseResult) -> dict[str, Any]:
+    """A case's facts; it did not pass where nothing was judged."""
+    verdicts = [row.verdict for row in result.rows] + [*_kinematics(result.facts)]
+    return result.facts | {"status": case_status(result.facts["status"], verdicts)}
+
+
+def _outcome(facts: Mapping[str, Any]) -> CaseOutcome:
+    return CaseOutcome(facts["status"], _kinematics(facts))
+
+
+def _kinematics(facts: Mapping[str, Any]) -> list[str]:
+    return [check["verdict"] for check in facts.get("kinematics_checks", ())]
 
 
 def _explained(

@@ -12,8 +12,6 @@ from workbench.commands.assignments import settings
 from workbench.commands.options import CampaignOrNone, OtherModel, SetInCases
 from workbench.errors import SpecError
 
-BOUND_FAILED = 1
-
 
 def run(
     campaign: CampaignOrNone = None,
@@ -64,7 +62,8 @@ def run(
 ) -> None:
     """Run a campaign: closed forms against MuJoCo, with a table of errors, a verdict and a report.
 
-    Exit code 0: every bound holds; 1: a bound fails or a case of a sweep does not pass; 2: bad input.
+    Exit code 0: every bound holds; 1: a bound fails or cannot be decided, or a case could not be computed; 2: bad
+    input; 4: nothing was held against a bound, so nothing is judged.
     """
     from workbench.campaign.evidence import Effort
     from workbench.campaign.run import run_campaign
@@ -89,7 +88,7 @@ def run(
         return
     if sweep:
         try:
-            passed = run_and_print(
+            code = run_and_print(
                 spec,
                 file,
                 out,
@@ -127,6 +126,6 @@ def run(
                 explain=brief,
             )
         print_outcome(outcome)
-        passed = outcome.passed
-    if not passed:
-        raise typer.Exit(BOUND_FAILED)
+        code = outcome.conclusion.exit_code
+    if code:
+        raise typer.Exit(code)

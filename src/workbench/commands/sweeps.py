@@ -17,7 +17,7 @@ from rich.text import Text
 from workbench import processes
 from workbench.campaign.evidence import Effort, check_engines
 from workbench.campaign.spec import Campaign
-from workbench.console import err, out
+from workbench.console import err, out, print_conclusion
 from workbench.errors import OutputError
 from workbench.sweep.estimate import estimate
 from workbench.sweep.progress import Snapshot
@@ -123,8 +123,8 @@ def run_and_print(
     options: SweepOptions,
     report: Callable[[Path], object],
     candidates: Sequence[str | Path] = (),
-) -> bool:
-    """Run a sweep, write its report and print its outcome; return whether every case passed."""
+) -> int:
+    """Run a sweep, write its report and print its outcome; return the exit code."""
     check_engines(effort.engines)
     with SweepProgress() as progress:
         outcome = run_sweep(
@@ -141,7 +141,7 @@ def run_and_print(
             report=report,
         )
     print_sweep(outcome)
-    return outcome.passed
+    return outcome.conclusion.exit_code
 
 
 def report_apart(directory: Path) -> None:
@@ -181,9 +181,7 @@ def print_sweep(outcome: SweepOutcome) -> None:
     for reason in summary["reasons"]:
         if reason["status"] != "filtered" or not summary["counts"]["passed"]:
             out.print(Text(f"{reason['status']} ({reason['cases']}): {reason['example']}"), style="yellow")
-    counts = ", ".join(f"{n} {status}" for status, n in summary["counts"].items() if n)
-    verdict = "PASSED" if outcome.passed else "FAILED"
-    out.print(Text(f"{verdict}: {counts}, of {summary['cases']} cases.", style="green" if outcome.passed else "red"))
+    print_conclusion(outcome.conclusion)
     out.print(Text(f"Report: {outcome.directory / 'report.html'}; data: sweep.json, cases, summary"), soft_wrap=True)
 
 

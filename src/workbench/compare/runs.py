@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from workbench.compare.errors import ErrorChange, match_errors
-from workbench.report.load import load_run
+from workbench.report.concluded import conclusion_of
+from workbench.report.load import Run, load_run
 from workbench.report.manifest import Manifest
 
 MISSING = None
@@ -39,9 +40,14 @@ class RunComparison:
 
     inputs: tuple[Difference, ...]
     outcomes: tuple[Difference, ...]
-    """status of cases, mobility, claims"""
+    """verdict, status of cases, mobility, claims"""
     errors: tuple[ErrorChange, ...]
     joints: tuple[str, ...]
+
+    @property
+    def shared(self) -> int:
+        """Errors that both runs have: without any there is nothing to compare."""
+        return sum(change.before is not None and change.after is not None for change in self.errors)
 
 
 def compare_runs(before: Path, after: Path) -> RunComparison:
@@ -60,7 +66,7 @@ def compare_runs(before: Path, after: Path) -> RunComparison:
     old, new = load_run(before), load_run(after)
     return RunComparison(
         inputs=tuple(_inputs(old.manifest, new.manifest)),
-        outcomes=tuple(_outcomes(old.manifest, new.manifest)),
+        outcomes=(*_verdicts(old, new), *_outcomes(old.manifest, new.manifest)),
         errors=tuple(match_errors(old.rows, new.rows)),
         joints=new.manifest.joints,
     )
@@ -78,6 +84,10 @@ def _inputs(old: Manifest, new: Manifest) -> Iterator[Difference]:
         yield from differences(group, "", getattr(old, field), getattr(new, field))
     for field in ("campaign", "engines", "budget", "git_commit"):
         yield from differences("run", field.replace("_", " "), getattr(old, field), getattr(new, field))
+
+
+def _verdicts(old: Run, new: Run) -> Iterator[Difference]:
+    yield from differences("outcome", "verdict", *(conclusion_of(run).word for run in (old, new)))
 
 
 def _outcomes(old: Manifest, new: Manifest) -> Iterator[Difference]:

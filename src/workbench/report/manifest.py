@@ -255,7 +255,10 @@ class KinematicsRecord(Record):
 class CaseRecord(Record):
     """One case: its status and the scalar evidence about mechanism and reference. Missing evidence is None."""
 
-    status: Literal["passed", "failed", "error", "undecided", "invalid", "timeout", "killed", "filtered"]
+    status: Literal[
+        "passed", "failed", "error", "undecided", "nothing-judged", "not-driven", "invalid", "timeout", "killed",
+        "filtered",
+    ]  # fmt: skip
     title: str = ""
     description: str = ""
     message: str | None = None
@@ -331,7 +334,9 @@ class Manifest(Record):
     started: str = ""
     finished: str = ""
     seconds: float | None = None
-    status: Literal["passed", "failed", "error"]
+    status: Literal["passed", "failed", "error", "undecided", "incomplete", "nothing-judged"]
+    verdict: str = ""
+    """the sentence beside the status; it can always be made again from rows and cases"""
     candidates: dict[str, CandidateRecord]
     claims: tuple[ClaimRecord, ...] = ()
     figures: tuple[FigureRecord, ...] = ()

@@ -27,8 +27,6 @@ UNDECIDED = Status("undecided", "?", "cannot be decided")
 
 EXPECTED_FAIL = Status("expected", "≠", "declared failure, seen")
 UNEXPECTED_PASS = Status("failed", "✗", "DECLARED FAILURE, NOT SEEN", loud=True)
-PASSED_VERDICT = Status("passed", "✓", "PASSED", loud=True)
-ERROR_VERDICT = Status("error", "⚠", "ERROR", loud=True)
 UNDECIDED_VERDICT = Status("undecided", "?", "UNDECIDED", loud=True)
 
 CASE_STATUS = {
@@ -36,12 +34,14 @@ CASE_STATUS = {
     "failed": FAILED,
     "error": ERROR,
     "undecided": UNDECIDED_VERDICT,
+    "nothing-judged": Status("unjudged", "–", "nothing judged"),
+    "not-driven": Status("error", "⚠", "CANNOT BE DRIVEN", loud=True),
     "invalid": Status("invalid", "⊘", "invalid, not computed"),
     "timeout": Status("timeout", "◷", "TIMED OUT", loud=True),
     "killed": Status("killed", "☠", "KILLED", loud=True),
     "filtered": Status("filtered", "", "filtered out"),
 }
-NOT_COMPUTED = frozenset({"error", "invalid", "timeout", "killed", "filtered"})
+NOT_COMPUTED = frozenset({"error", "not-driven", "invalid", "timeout", "killed", "filtered"})
 """Statuses of cases that have no series."""
 VERDICT_STATUS = {
     "pass": PASSED,

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.campaign import store
+from workbench.campaign.conclusion import Conclusion
 from workbench.campaign.evidence import Effort
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
@@ -28,7 +29,7 @@ from workbench.sweep.journal import Journal
 from workbench.sweep.plan import Plan, plan_sweep
 from workbench.sweep.progress import Meter, Show
 from workbench.sweep.record import lost
-from workbench.sweep.statistics import passed, summarise
+from workbench.sweep.statistics import concluded, summarise
 from workbench.sweep.supervisor import Lost, Setup, Supervisor
 
 SYNC_EVERY_S = 5.0
@@ -55,12 +56,17 @@ class SweepOptions:
 
 @dataclass(frozen=True)
 class SweepOutcome:
-    """A finished sweep: where it lies, whether every case passed, and its summary."""
+    """A finished sweep: where it lies, the verdict on it, and its summary."""
 
     directory: Path
-    passed: bool
+    conclusion: Conclusion
     summary: dict[str, Any]
     manifest: dict[str, Any]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every case that was not left out holds its bounds, and there is one that was held against any."""
+        return self.conclusion.passed
 
 
 class Pool(Protocol):
@@ -140,7 +146,7 @@ def run_sweep(
     started, clock = datetime.now(UTC), time.perf_counter()
     assert campaign.sweep is not None
     keep_series = campaign.sweep.keep_series
-    effort = Effort(effort.engines, budget=campaign.sweep.budget, drawing=False, timed=False)
+    effort = Effort(effort.engines, budget=campaign.sweep.budget, drawing=False, timed=False, described=False)
     names = full_names(candidates)
     users = load_candidates(names)
     campaign = with_rows(campaign, users)
@@ -183,7 +189,7 @@ def run_sweep(
             if new and not state.holds_cases(directory):
                 shutil.rmtree(directory, ignore_errors=True)
             raise
-    return SweepOutcome(directory, passed(summary["counts"]), summary, manifest)
+    return SweepOutcome(directory, concluded(summary), summary, manifest)
 
 
 def _refused(directory: Path, error: OSError, done: int, total: int) -> OutputError:
@@ -273,7 +279,8 @@ def _lost(context: Context, plan: Plan, index: int, found: Lost) -> Answer:
 def _manifest(campaign: Campaign, file: Path, plan: Plan, summary: Mapping[str, Any]) -> dict[str, Any]:
     return describe(campaign, file, plan.model, plan.robot) | {
         "format": store.FORMAT,
-        "status": "passed" if passed(summary["counts"]) else "failed",
+        "status": concluded(summary).status,
+        "verdict": concluded(summary).sentence,
         "candidates": {
             c.name: {
                 "mass_model": plan.robot.candidates[c.name].mass_model,

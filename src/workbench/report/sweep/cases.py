@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from workbench.campaign.conclusion import GOOD
 from workbench.report.section import Section
 from workbench.report.sweep.load import SweepRun
 from workbench.report.sweep.summary import MODELLING
 from workbench.report.sweep.varied import label_of
-from workbench.report.sweep.verdict import GOOD, number, status_of
+from workbench.report.sweep.verdict import number, status_of
 from workbench.report.tables import Cell, Table, columns
 from workbench.report.text import exact, percent, pretty_unit, scientific
 
