@@ -27,7 +27,7 @@ MARKS_PER_S = 4.0
 """How often the moment is marked in the curves while the motion plays."""
 SETTLED_S = 0.6
 """A slider that rests so long has been let go: the next change is another step back."""
-CONTROLS, RESULTS = 330, 400
+CONTROLS, RESULTS = 300, 350
 """Widths of the panels, px."""
 
 
