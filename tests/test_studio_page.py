@@ -52,14 +52,14 @@ def test_a_moved_slider_arrives_and_its_answer_is_written(page: Page) -> None:
     assert "m3 from 0.45 to 0.6 kg" in page._head.content
     assert "claims are not about this robot" in page._head.content
     assert "<th>file</th><th>change</th>" in page._peaks.content
-    page._step("Undo")
+    page.step("Undo")
     idle(page)
     assert slider.value == 0.45
     assert "nothing was changed here" in page._head.content
-    page._step("Redo")
+    page.step("Redo")
     idle(page)
     assert slider.value == 0.6
-    page._step("Back to the paper")
+    page.step("Back to the paper")
     idle(page)
     assert slider.value == 0.45
 
@@ -76,7 +76,7 @@ def test_what_is_typed_may_lie_beyond_the_sliders_and_what_is_wrong_is_said(page
     idle(page)
     assert "out of reach" in page._head.content
     assert "last state that works" in page._head.content
-    page._step("Undo")
+    page.step("Undo")
     idle(page)
     assert "Not shown" not in page._head.content
 

@@ -15,6 +15,7 @@ from workbench.robots.assignments import parse_assignment, resolve_changes
 from workbench.studio import words
 from workbench.studio.curves import QUANTITIES, Curves
 from workbench.studio.keep import Keep
+from workbench.studio.keys import add_keys
 from workbench.studio.panels import Knobs
 from workbench.studio.pointing import Pointing
 from workbench.studio.scene import MARKS, Scene
@@ -62,7 +63,7 @@ class Page:
         self.scene = Scene(server)
         self._results_panel()
         self._controls()
-        self._hotkeys()
+        add_keys(self)
         self._show()
         self.worker.ask("reach", lambda: self._reach(None))
         self._player = threading.Thread(target=self._play, name="studio player", daemon=True)
@@ -104,7 +105,7 @@ class Page:
             )
             self._pace = gui.add_slider("pace", min=0.05, max=2.0, step=0.05, initial_value=1.0)
             worst = gui.add_button("Worst moment", hint="where a torque is at its peak")
-        steps = gui.add_button_group("changes", ("Undo", "Redo", self._back_words()))
+        steps = gui.add_button_group("changes", ("Undo", "Redo", self.back_words()))
         tabs = gui.add_tab_group()
         with tabs.add_tab("Robot"):
             self.knobs = Knobs(gui, self.session, self._knob)
@@ -118,14 +119,15 @@ class Page:
             self._look_tab()
         with tabs.add_tab("Keep"):
             self.keep = Keep(gui, self.session)
-        self._play_button.on_click(lambda _: self.play(not self._playing))
+        self._play_button.on_click(lambda _: self.toggle())
         self._time.on_update(lambda _: self._grabbed())
         self._pace.on_update(lambda _: setattr(self, "_speed", float(self._pace.value)))
         worst.on_click(lambda _: self.worst())
-        steps.on_click(lambda event: self._step(event.target.value))
+        steps.on_click(lambda event: self.step(event.target.value))
         typed.on_click(lambda _: self._type(self._typed.value))
 
-    def _back_words(self) -> str:
+    def back_words(self) -> str:
+        """What the way back is called."""
         sources = (info.source for info in self.session.subject.base.description.table.infos.values())
         return "Back to the paper" if any(source.startswith("[") for source in sources) else "Back to the file"
 
@@ -172,18 +174,6 @@ class Page:
         dark.on_update(lambda _: self._darken(bool(dark.value)))
         self.pointing = Pointing(self)
 
-    def _hotkeys(self) -> None:
-        gui: Any = self.server.gui
-        for label, key, modifier, act in (
-            ("Play or pause", "space", None, lambda: self.play(not self._playing)),
-            ("Worst moment", "W", None, self.worst),
-            ("Undo", "Z", "cmd/ctrl", lambda: self._step("Undo")),
-            ("Redo", "Z", "cmd/ctrl+shift", lambda: self._step("Redo")),
-            (self._back_words(), "B", "shift", lambda: self._step("Back")),
-        ):
-            command = gui.add_command(label, hotkey=key, modifier=modifier)
-            command.on_trigger(partial(_triggered, act))
-
     # asking
 
     def _asked(self, change: Callable[[], object]) -> None:
@@ -224,7 +214,8 @@ class Page:
         self._moved = None
         self._asked(change)
 
-    def _step(self, which: str) -> None:
+    def step(self, which: str) -> None:
+        """Undo, redo, or go back to the file."""
         history = self.session.history
         act = {"Undo": history.undo, "Redo": history.redo}.get(which, self.session.back_to_file)
         self._moved = None
@@ -321,6 +312,10 @@ class Page:
         if not on:
             self.at(self.sample)
 
+    def toggle(self) -> None:
+        """Play, or pause."""
+        self.play(not self._playing)
+
     def worst(self) -> None:
         """Go to the moment at which a torque is at its peak."""
         self.play(False)
@@ -403,7 +398,3 @@ class Page:
             self._settling.cancel()
         self.worker.end()
         self._player.join(timeout=2.0)
-
-
-def _triggered(act: Callable[[], None], _: Any) -> None:
-    act()
