@@ -17,7 +17,7 @@ from rich.text import Text
 from workbench import processes
 from workbench.campaign.evidence import Effort, check_engines
 from workbench.campaign.spec import Campaign
-from workbench.console import err, out, print_conclusion
+from workbench.console import err, out, print_changes, print_conclusion
 from workbench.errors import OutputError
 from workbench.sweep.estimate import estimate
 from workbench.sweep.progress import Snapshot
@@ -165,6 +165,7 @@ def report_apart(directory: Path) -> None:
 def print_sweep(outcome: SweepOutcome) -> None:
     """Print counts, errors over all cases, what drives them, and the verdict."""
     summary = outcome.summary
+    print_changes(outcome.manifest)
     table = Table(title="Errors over all cases, largest joint", title_justify="left", box=box.SIMPLE_HEAD)
     for column in ("candidate", "MuJoCo model", "median", "95 %", "largest", "case"):
         table.add_column(column, justify="right" if column in ("median", "95 %", "largest") else "left")

@@ -22,7 +22,7 @@ from workbench.report.style import GRID, INK
 from workbench.report.svg import new_figure
 from workbench.report.sweep.load import SweepRun
 from workbench.report.tables import Cell, Table
-from workbench.report.verdict_section import circumstances
+from workbench.report.verdict_section import changes, circumstances
 
 A4 = (8.27, 11.69)
 MARGIN = 0.55
@@ -34,6 +34,7 @@ LETTER = 0.56
 BODY, SMALL_PRINT, TABLE_PRINT = 9.0, 7.5, 6.4
 NARROWEST = 6
 """Letters that a column keeps when a table is too wide for the page."""
+CHANGED = "Changed from the published robot. Claims about it are not judged where this concerns them."
 FULL_WIDTH_FROM = 7.0
 """inches: figures designed wider than this take the whole width of the page"""
 
@@ -188,6 +189,10 @@ def report_pdf(run: Run | SweepRun, sections: Sequence[Section]) -> bytes:
             pages.lines(title, 15.0, bold=True)
             pages.lines(manifest.description, BODY, after=0.1)
             pages.lines(" ".join(circumstances(manifest)), SMALL_PRINT, after=0.2)
+            if said := changes(manifest):
+                pages.lines(CHANGED, BODY, bold=True)
+                for line in said:
+                    pages.lines(f"• {line}", BODY)
             if costs := cost_table(manifest):
                 pages.table(costs)
             for section in sections:

@@ -23,6 +23,7 @@ ERROR = Status("error", "⚠", "ERROR, not computed", loud=True)
 MEASURED = Status("measured", "", "measured")
 HOLDS = Status("passed", "✓", "holds")
 REFUTED = Status("refuted", "✗", "does not hold")
+NOT_ABOUT = Status("unjudged", "–", "not about this robot")
 UNDECIDED = Status("undecided", "?", "cannot be decided")
 
 EXPECTED_FAIL = Status("expected", "≠", "declared failure, seen")
