@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+CASE = "case parameters"
+"""By what the campaign itself changes single cases."""
 SHOWN = 8
 """Names that a sentence lists one by one."""
 
@@ -32,6 +34,8 @@ def sentences(model: str, parameters: Sequence[Any], every: Sequence[str]) -> li
     every
         Names of all cases.
     """
+    own = [one for one in parameters if one.by == CASE]
+    parameters = [one for one in parameters if one.by != CASE]
     lines = [f"{model[:1].upper()}{model[1:]}."] if model else []
     groups: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     for one in parameters:
@@ -39,6 +43,10 @@ def sentences(model: str, parameters: Sequence[Any], every: Sequence[str]) -> li
     for (by, cases), said in groups.items():
         where = "" if set(cases) >= set(every) else f" in {few(list(cases))}"
         lines.append(f"{by[:1].upper()}{by[1:]}{where}: {few(said)}.")
+    if own:  # the campaign's own business, told with each case
+        concerned = list(dict.fromkeys(case for one in own for case in one.cases))
+        names = list(dict.fromkeys(one.name for one in own))
+        lines.append(f"Parameters of their own in {few(concerned)}: {few(names)}.")
     return lines
 
 

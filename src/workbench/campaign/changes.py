@@ -9,7 +9,7 @@ from typing import Any
 
 from workbench.campaign import provenance
 from workbench.campaign.cases import robot_of
-from workbench.campaign.changed import Change, few, said_of
+from workbench.campaign.changed import CASE, Change, few, said_of
 from workbench.campaign.spec import Campaign
 from workbench.capabilities.load import robot_with
 from workbench.capabilities.robot import Robot
@@ -18,8 +18,8 @@ from workbench.robots.assignments import parse_assignment
 from workbench.robots.parameters import ParameterTable
 from workbench.robots.published import published_values
 
-SET, CASE, CAMPAIGN, MODEL, FILE, FOLLOWS = (
-    "--set", "case parameters", "campaign parameters", "--model", "the file", "follows, a bar stays uniform",
+SET, CAMPAIGN, MODEL, FILE, FOLLOWS = (
+    "--set", "campaign parameters", "--model", "the file", "follows, a bar stays uniform",
 )  # fmt: skip
 """By what a number was changed; it is the number's source from then on."""
 
@@ -97,7 +97,8 @@ def changes_of(
         for name, value in variant.robot.values.items():
             if name in named and value != named[name]:
                 by = next((by for by in (SET, CASE, CAMPAIGN) if name in own[by]), "")
-                by = by or ((MODEL if model else FILE) if value == filed.get(name) else FOLLOWS)
+                if not by:
+                    by = (MODEL if model else FILE) if value == filed.get(name) else _cause(table, name, own)
                 found.setdefault((name, value, by), []).append(variant.case)
     return Changes(
         other,
@@ -107,6 +108,17 @@ def changes_of(
         ),
         tuple(variant.case for variant in variants),
     )
+
+
+def _cause(table: ParameterTable, name: str, given: Mapping[str, set[str]]) -> str:
+    """By what a number was changed that follows from its bar's mass or length."""
+    for bar in table.bars:
+        follows = {*bar.inertia, *([bar.centre] if bar.centre else []), *(one for one, _, _ in bar.own)}
+        if name in follows:
+            for by in (SET, CASE, CAMPAIGN):
+                if given[by] & {bar.mass, bar.length}:
+                    return by
+    return FOLLOWS
 
 
 def _names(table: ParameterTable, given: Sequence[str] | Mapping[str, float]) -> set[str]:

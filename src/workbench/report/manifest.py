@@ -360,6 +360,8 @@ class Manifest(Record):
     budget: bool | None = None
     """whether the evidence about the reference was gathered; None where the run does not say"""
     command: str = ""
+    request: dict[str, Any] | None = None
+    """model, set, only, candidates as they were asked for; None in runs of earlier versions"""
     started: str = ""
     finished: str = ""
     seconds: float | None = None
