@@ -39,6 +39,7 @@ from workbench.campaign.verdict import (
     MODELLING,
     PASS,
     RECORDED,
+    UNBOUNDED,
     UNDECIDED,
     UNEXPECTED_PASS,
     VERIFICATION,
@@ -142,7 +143,8 @@ def print_outcome(outcome: Outcome) -> None:
     tables = (
         (VERIFICATION, "Verification: closed form against MuJoCo, same masses", _scientific),
         (EXPECTED_FAILURE, "Declared failures: what each mistake costs, joint by joint", _percent),
-        (MODELLING, "Modelling error: what the simpler mass model costs", _percent),
+        (MODELLING, "Modelling error: what another mass model than the reference's costs", _percent),
+        (UNBOUNDED, "Measured, nothing judged: formulas without a bound against MuJoCo, same masses", _percent),
         (RECORDED, "Measured or simulated elsewhere: recorded torques against MuJoCo, as found by error", _percent),
         (CONTRAST, "For contrast: MuJoCo's inverse dynamics without projection", _percent),
     )

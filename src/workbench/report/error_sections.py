@@ -76,6 +76,14 @@ def worst_section(run: Run, anchors: Mapping[str, str]) -> Section:
         _by_joint(
             run,
             anchors,
+            "unbounded",
+            "Measured, nothing judged: formulas without a bound against the reference of the same mass model.",
+            "The row's largest in bold, and rows in order of it",
+            percent,
+        ),
+        _by_joint(
+            run,
+            anchors,
             "recorded",
             "Measured or simulated elsewhere: recorded torques against the reference.",
             "What each figure is worth stands in its case's section",
@@ -134,7 +142,7 @@ def _by_joint(
             if found is None:
                 cells.append(Cell("–"))
                 continue
-            strong = found is largest if kind == "modelling" else found.verdict == "expected-fail"
+            strong = found is largest if kind in ("modelling", "unbounded") else found.verdict == "expected-fail"
             cells.append(Cell(number(found.peak_error), found.peak_error, emphasis=strong))
         loudest = next((row for row in by_joint.values() if row.verdict in FAILURES), largest)
         status = Cell(status=verdict_status(loudest.verdict))
