@@ -226,7 +226,7 @@ def print_changes(manifest: Mapping[str, Any]) -> None:
     changes = manifest["changes"]
     said = sentences(changes["model"], [Change(**one) for one in changes["parameters"]], list(manifest["cases"]))
     if said:
-        out.print(Text("Changed from the published robot:", style="bold yellow"))
+        out.print(Text("Another robot than the one that the campaign is about:", style="bold yellow"))
     for line in said:
         out.print(Text(f"  {line}"), soft_wrap=True)
 
