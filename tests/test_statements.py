@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -75,6 +76,10 @@ class Row:
     bound: float | None = 1e-10
 
 
+def row_of(verdict: str | tuple[str, None]) -> Row:
+    return Row(verdict) if isinstance(verdict, str) else Row(verdict[0], bound=verdict[1])
+
+
 DONE = {"a": CaseOutcome("passed")}
 
 
@@ -94,13 +99,14 @@ DONE = {"a": CaseOutcome("passed")}
         (["pass"], DONE | {"b": CaseOutcome("failed")}, "failed", "1 case failed for another reason (b)"),
         (["pass"], DONE | {"b": CaseOutcome("not-driven")}, "incomplete", "1 of 2 cases could not be computed (b)"),
         (["measured"], DONE | {"b": CaseOutcome("not-driven")}, "incomplete", "held against a bound in the others"),
+        ([("fail", None), "pass"], DONE, "failed", "1 row of formulas without a bound broke down (mine)"),
         (["fail"], DONE | {"b": CaseOutcome("not-driven")}, "failed", "could not be computed (b)"),
     ],
 )
 def test_one_verdict_is_made_of_all_that_happened(
-    verdicts: list[str], cases: dict[str, CaseOutcome], status: str, said: str
+    verdicts: list[str | tuple[str, None]], cases: dict[str, CaseOutcome], status: str, said: str
 ) -> None:
-    found = conclude([Row(verdict) for verdict in verdicts], cases)
+    found = conclude([row_of(verdict) for verdict in verdicts], cases)
     assert (found.status, said in found.sentence) == (status, True), found
     assert found.passed is (status == "passed")
     assert found.exit_code == EXIT_CODES[status]
@@ -252,12 +258,12 @@ def test_only_what_loses_something_is_refused(
     (tmp_path / "manifest.json").write_text(json.dumps(old))
 
     def refused(campaign: str) -> str:
-        try:
+        with contextlib.suppress(OutputError):
             refuse_loss(tmp_path, campaign, request_, cases, candidates)
-        except OutputError as error:
-            assert "--replace" in str(error)
-            return str(error)
-        return ""
+            return ""
+        with pytest.raises(OutputError, match="--replace") as found:
+            refuse_loss(tmp_path, campaign, request_, cases, candidates)
+        return str(found.value)
 
     assert (lost in refused("c")) if lost else refused("c") == ""
     assert 'the campaign "c"' in refused("other")
@@ -332,8 +338,8 @@ def test_a_change_of_all_cases_is_compared_once() -> None:
     assert list(parameter_changes(old, new)) == [("a1_left, a1_right", 0.21, 0.23)]
     assert list(parameter_changes(old, old)) == []
     # runs that say what was changed: one case apart
-    plain = manifest_of(dict.fromkeys(names, {}), **changed())
-    apart = manifest_of(dict.fromkeys(names, {}), **changed(("m3", 0.5, 0.9, ["c7"])))
+    plain = manifest_of({name: {} for name in names}, **changed())
+    apart = manifest_of({name: {} for name in names}, **changed(("m3", 0.5, 0.9, ["c7"])))
     assert list(parameter_changes(plain, apart)) == [("m3 in c7", 0.5, 0.9)]
 
 

@@ -41,7 +41,7 @@ def sentences(model: str, parameters: Sequence[Any], every: Sequence[str]) -> li
     for one in parameters:
         groups.setdefault((one.by, tuple(one.cases)), []).append(said_of(one, by=False))
     for (by, cases), said in groups.items():
-        where = "" if set(cases) >= set(every) else f" in {few(list(cases))}"
+        where = among(cases, every)
         lines.append(f"{by[:1].upper()}{by[1:]}{where}: {few(said)}.")
     if own:  # the campaign's own business, told with each case
         concerned = list(dict.fromkeys(case for one in own for case in one.cases))
@@ -61,3 +61,11 @@ def few(said: Sequence[str]) -> str:
     """Join names, the first of them where they are many."""
     more = f" and {len(said) - SHOWN} more" if len(said) > SHOWN else ""
     return ", ".join(said[:SHOWN]) + more
+
+
+def among(cases: Sequence[str], every: Sequence[str]) -> str:
+    """Say which of *every* case something concerns, in as few names as it takes: `` in a``, `` in all cases but b``."""
+    others = [case for case in every if case not in cases]
+    if not others:
+        return ""
+    return f" in all cases but {few(others)}" if len(others) < len(cases) else f" in {few(list(cases))}"

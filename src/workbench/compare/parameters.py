@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from workbench.campaign.changed import few
+from workbench.campaign.changed import among, few
 from workbench.report.manifest import Manifest
 from workbench.report.tables import NOT_COMPUTED
 
@@ -27,8 +27,7 @@ def parameter_changes(old: Manifest, new: Manifest) -> Iterator[tuple[str, float
     for (name, was, becomes), cases in found.items():
         alike.setdefault((was, becomes, tuple(cases)), []).append(name)
     for (was, becomes, concerned), names in alike.items():
-        where = "" if len(concerned) == len(shared) else f" in {few(list(concerned))}"
-        yield f"{few(names)}{where}", was, becomes
+        yield f"{few(names)}{among(concerned, shared)}", was, becomes
 
 
 def _values(manifest: Manifest, case: str) -> dict[str, float | None]:

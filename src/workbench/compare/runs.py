@@ -14,7 +14,7 @@ from workbench.compare.errors import ErrorChange, match_errors
 from workbench.compare.parameters import parameter_changes
 from workbench.report.concluded import conclusion_of
 from workbench.report.load import Run, load_run
-from workbench.report.manifest import Manifest
+from workbench.report.manifest import ClaimRecord, Manifest
 
 MISSING = None
 """Stands for what a run does not have, as in JSON."""
@@ -125,11 +125,14 @@ def _outcomes(old: Manifest, new: Manifest) -> Iterator[Difference]:
             continue
         for field in ("status", "mobility", "rank", "redundant_rows", "idle_freedoms"):
             yield from differences("outcome", f'case "{name}" {field}', getattr(one, field), getattr(two, field))
-    claims = [{claim.id: _word(claim.holds) for claim in manifest.claims} for manifest in (old, new)]
+    claims = [{claim.id: _word(claim) for claim in manifest.claims} for manifest in (old, new)]
     yield from differences("outcome", "claim", *claims)
 
 
-def _word(holds: bool | None) -> str:
+def _word(claim: ClaimRecord) -> str:
+    if claim.not_about:
+        return "not about this robot"
+    holds = claim.holds
     return "undecided" if holds is None else "holds" if holds else "does not hold"
 
 

@@ -34,7 +34,10 @@ LETTER = 0.56
 BODY, SMALL_PRINT, TABLE_PRINT = 9.0, 7.5, 6.4
 NARROWEST = 6
 """Letters that a column keeps when a table is too wide for the page."""
-CHANGED = "Another robot than the one that the campaign is about. Claims about that one are not judged where this concerns them."
+CHANGED = (
+    "Another robot than the one that the campaign is about. Claims about that one are not judged where this concerns"
+    " them."
+)
 FULL_WIDTH_FROM = 7.0
 """inches: figures designed wider than this take the whole width of the page"""
 
