@@ -257,7 +257,7 @@ def test_nothing_but_cases_left_out_proves_nothing(workbench: Workbench, inline:
     nothing = FEW.replace("offset = [0.0,", "offset = [0.5,")
     done = workbench.run(nothing, "--out", "run")
     assert done.code == 1
-    assert "FAILED: 10 filtered, of 10 cases." in done.out
+    assert "NOTHING JUDGED: all 10 cases were left out by the filter" in done.out
     assert manifest(workbench.directory / "run")["status"] == "failed"
 
 
