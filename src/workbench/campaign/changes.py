@@ -128,15 +128,16 @@ def _names(table: ParameterTable, given: Sequence[str] | Mapping[str, float]) ->
 def _named(campaign: Campaign, file: Path, model: Path | None, robot: Robot) -> tuple[Mapping[str, float] | None, str]:
     """Parameters of the robot that is spoken of, and what is said of another model in its place."""
     published = published_values(robot.description)
-    if published is not None:
-        return published, ""
     if model is None:
-        return robot.file_values, ""
+        return published or robot.file_values, ""
     said = f"another model, {model.name} (--model)"
     try:
         described, path = robot_of(campaign, file)
         if provenance.sha256(path.read_bytes()) == provenance.sha256(model.read_bytes()):
-            return robot.file_values, ""
-        return robot_with(path, {}, described).values, said
+            return published or robot.file_values, ""
+        own = robot_with(path, {}, described)
     except (WorkbenchError, OSError):  # the campaign's own model is not there
-        return None, said
+        return published, "" if published else said
+    if published is not None and own.name == robot.name:
+        return published, ""  # its numbers say all that is not as published
+    return (own.values if own.name == robot.name or not published else None), said
