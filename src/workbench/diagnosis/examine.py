@@ -20,7 +20,7 @@ from workbench.diagnosis.result import FAILURE, KINEMATICS, NUMERIC, Diagnosis, 
 from workbench.diagnosis.sentences import dynamic_findings, list_of, plain_findings
 from workbench.diagnosis.shares import Share, both_sides, share_of
 from workbench.diagnosis.structure import structure_findings
-from workbench.diagnosis.subject import AFFINE, Subject
+from workbench.diagnosis.subject import AFFINE, GRAVITY, Subject
 from workbench.errors import WorkbenchError
 
 SHARE_POSES = 6
@@ -291,7 +291,8 @@ def _rounded(seen: Examined, joints: tuple[str, ...]) -> Finding | None:
         " off in any), as where constants are rounded, derivatives are taken by finite differences or an iteration"
         " ends early"
     )
-    shares_off = tuple(share.parameter.name for share in seen.shares if share.parameter.read and share.wrong)
+    off = [share.parameter for share in seen.shares if share.parameter.read and share.wrong]
+    shares_off = tuple(p.name for p in off if p.kind != GRAVITY) or tuple(p.name for p in off)
     if shares_off:
         text += f"; seen in what {list_of(shares_off)} {'is' if len(shares_off) == 1 else 'are'} worth"
     return replace(_of_entries(NUMERIC, text, wrong, joints), parameters=shares_off)
