@@ -52,18 +52,20 @@ def main() -> int:
     PLACE.mkdir(parents=True, exist_ok=True)
     tree.renew()
     trial.warm()
-    if options.reach or not (REACHED.exists() or options.tests):
+    given = options.tests or options.short
+    if options.reach or not (REACHED.exists() or given):
         _reach(options.tests or modules.core_test_files(), REACHED)
     chosen = list(_chosen(options))
     kernels = any(modules.is_kernel(planted.module) for planted in chosen)
-    if options.reach_kernels or (kernels and not (INTERPRETED.exists() or options.tests)):
+    if options.reach_kernels or (kernels and not (INTERPRETED.exists() or given)):
         _reach([modules.test_file(name) for name in modules.INTERPRETED_TESTS], INTERPRETED)
     known = {entry["key"]: entry for entry in _results()}
     for number, planted in enumerate(chosen, 1):
         before = known.get(planted.key)
         if before and (before["status"] == trial.KILLED or not options.again):
             continue
-        outcome, tests = _try(planted, options.budget, options.tests or [])
+        files = options.tests or (modules.group_tests(planted.group) if options.short else [])
+        outcome, tests = _try(planted, options.budget, files)
         entry = {"key": planted.key, "group": planted.group, "module": planted.module, **asdict(planted.mutant),
                  **asdict(outcome), "tests": tests}  # fmt: skip
         known[planted.key] = entry
@@ -89,6 +91,9 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--operator", default="", help="this operator alone")
     parser.add_argument("--line", type=int, help="faults of this line alone")
     parser.add_argument("--again", action="store_true", help="try again what survived before")
+    parser.add_argument(
+        "--short", action="store_true", help="whole test files of each group, no look at who reaches what"
+    )
     parser.add_argument("--reach", action="store_true", help="find anew which tests reach which lines")
     parser.add_argument("--reach-kernels", action="store_true", help="the same for kernels, uncompiled")
     parser.add_argument("--tests", nargs="*", help="test files for --reach, or to try faults with as they are")

@@ -46,6 +46,22 @@ INTERPRETED_TESTS = ("reference_linear", "closure_kinds", "own_reference", "reac
 """Small enough to run with all kernels uncompiled."""
 
 
+GROUP_TESTS: dict[str, tuple[str, ...]] = {
+    "metrics": ("metrics",),
+    "verdict": ("verdict", "compare_case"),
+    "comparison": ("verdict", "compare_case"),
+    "mjcf": ("mjcf_setup", "mjcf_roundtrip", "mjcf_source", "mjcf_assumptions"),
+    "robots": ("agreement", "body_numbers", "screws", "asym_kernel", "planar_4rprp", "mass_models", "mjcf_roundtrip"),
+    "reference": ("reference_linear", "closure_kinds", "own_reference", "counted_forces", "reference_closure"),
+}
+"""The tests of each group that a short run tries, in this order, without knowing who reaches what."""
+
+
+def group_tests(group: str) -> list[str]:
+    """Test files of a short run."""
+    return [test_file(name) for name in GROUP_TESTS.get(group, ())]
+
+
 def files_of(group: str) -> list[str]:
     """Files of a group, below the package."""
     found = {path for pattern in GROUPS[group] for path in PACKAGE.glob(pattern)}
