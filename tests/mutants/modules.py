@@ -42,6 +42,9 @@ KERNEL_TESTS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Beginnings of the names of files with kernels, the first that fits: tests of the compiled kernels."""
 
+UNCOMPILED = ("closure_kinds", "own_reference")
+"""Of these the quickest."""
+
 INTERPRETED_TESTS = ("reference_linear", "closure_kinds", "own_reference", "reactions", "idle_rods", "task_coordinates")
 """Small enough to run with all kernels uncompiled."""
 
@@ -57,9 +60,12 @@ GROUP_TESTS: dict[str, tuple[str, ...]] = {
 """The tests of each group that a short run tries, in this order, without knowing who reaches what."""
 
 
-def group_tests(group: str) -> list[str]:
+def short_tests(group: str, module: str) -> list[str]:
     """Test files of a short run."""
-    return [test_file(name) for name in GROUP_TESTS.get(group, ())]
+    names = GROUP_TESTS[group]
+    if is_kernel(module):
+        names = UNCOMPILED if module.startswith("reference/") else KERNEL_TESTS[f"{module.rpartition('/')[0]}/"]
+    return [test_file(name) for name in names]
 
 
 def files_of(group: str) -> list[str]:
