@@ -429,10 +429,10 @@ def test_verdicts_differ_in_words_and_style(tmp_path: Path) -> None:
     assert len({(status.symbol, status.text) for status, _ in seen.values()}) == 3
     assert seen["passed"][1].startswith("all 24 checks in 2 cases hold their bounds; worst is ")
     assert seen["failed"][1].startswith(
-        "1 of 24 checks exceed their bound (worst is lumped on joint q1 in case sim1: 1.02e+00"
+        "1 of 24 checks exceed their bounds (worst is lumped on joint q1 in case sim1: 1.02e+00"
     )
     assert seen["other"][1] == "1 case failed for another reason (sim1)."
-    assert seen["error"][1].startswith("1 of 3 cases could not be computed (broken); the 24 checks that were made hold")
+    assert seen["error"][1].startswith("1 of 3 cases could not be computed (broken); all 24 checks in 2 cases hold")
 
 
 def test_declared_failures_are_told_from_failures(tmp_path: Path) -> None:

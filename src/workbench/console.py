@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from workbench.campaign.changed import Change, sentences
 from workbench.campaign.compare import Row
 from workbench.campaign.conclusion import (
     FAILED,
@@ -24,6 +25,7 @@ from workbench.campaign.conclusion import (
     UNDECIDED_RUN,
     Conclusion,
 )
+from workbench.campaign.not_driven import NOT_DRIVEN
 from workbench.campaign.run import Outcome
 from workbench.campaign.verdict import (
     AGREES,
@@ -37,6 +39,7 @@ from workbench.campaign.verdict import (
     MODELLING,
     PASS,
     RECORDED,
+    UNBOUNDED,
     UNDECIDED,
     UNEXPECTED_PASS,
     VERIFICATION,
@@ -136,10 +139,12 @@ class Steps(_Bar):
 def print_outcome(outcome: Outcome) -> None:
     """Print the table of errors, the claims, the verdict and where the report lies."""
     manifest = outcome.manifest
+    print_changes(manifest)
     tables = (
         (VERIFICATION, "Verification: closed form against MuJoCo, same masses", _scientific),
         (EXPECTED_FAILURE, "Declared failures: what each mistake costs, joint by joint", _percent),
-        (MODELLING, "Modelling error: what the simpler mass model costs", _percent),
+        (MODELLING, "Modelling error: what another mass model than the reference's costs", _percent),
+        (UNBOUNDED, "Measured, nothing judged: formulas without a bound against MuJoCo, same masses", _percent),
         (RECORDED, "Measured or simulated elsewhere: recorded torques against MuJoCo, as found by error", _percent),
         (CONTRAST, "For contrast: MuJoCo's inverse dynamics without projection", _percent),
     )
@@ -152,13 +157,17 @@ def print_outcome(outcome: Outcome) -> None:
     out.print(Text("Each error is max|tau - tau_ref| / max|tau_ref| of that joint over the case."), style="dim")
     _print_kinematics(manifest["cases"])
     for name, case in manifest["cases"].items():
+        if case["status"] == NOT_DRIVEN:
+            out.print(Text(f"cannot be driven: {case['message']}", style="yellow"), soft_wrap=True)
         for warning in case["warnings"]:
             out.print(Text(f'warning: case "{name}": {warning}'), style="yellow")
     refuted = [claim for claim in manifest["claims"] if claim["holds"] is False]
     if manifest["claims"]:
         held = sum(claim["holds"] is True for claim in manifest["claims"])
-        undecided = len(manifest["claims"]) - held - len(refuted)
+        others = sum(bool(claim["not_about"]) for claim in manifest["claims"])
+        undecided = len(manifest["claims"]) - held - len(refuted) - others
         counts = [f"{held} confirmed", f"{len(refuted)} not confirmed", f"{undecided} cannot be decided"]
+        counts.append(f"{others} not about this robot")
         out.print(Text(f"Claims: {', '.join(c for c in counts if not c.startswith('0 '))}."))
     for claim in refuted:
         measured, claimed = _quantity(claim["measured"], claim["unit"]), _quantity(claim["claimed"], claim["unit"])
@@ -210,6 +219,16 @@ def _print_diagnosis(diagnosis: dict[str, Any]) -> None:
         for sentence in found["findings"]:
             out.print(Text(f"  - {sentence}"))
         out.print(Text(f"  {found['command']}", style="dim"), soft_wrap=True)
+
+
+def print_changes(manifest: Mapping[str, Any]) -> None:
+    """Print what was changed of the robot that the campaign's claims are about."""
+    changes = manifest["changes"]
+    said = sentences(changes["model"], [Change(**one) for one in changes["parameters"]], list(manifest["cases"]))
+    if said:
+        out.print(Text("Another robot than the one that the campaign is about:", style="bold yellow"))
+    for line in said:
+        out.print(Text(f"  {line}"), soft_wrap=True)
 
 
 def print_conclusion(found: Conclusion) -> None:

@@ -104,11 +104,12 @@ def conclude(rows: Iterable[Judged], cases: Mapping[str, CaseOutcome]) -> Conclu
         Name to outcome, in the campaign's order.
     """
     listed = list(rows)
-    checks = [row for row in listed if row.verdict in (PASS, FAIL, UNDECIDED)]
+    broken = [row for row in listed if row.verdict == FAIL and not row.bound]
+    checks = [row for row in listed if row.verdict in (PASS, FAIL, UNDECIDED) and row.bound]
     kinematics = [verdict for case in cases.values() for verdict in case.kinematics]
     made = len(checks) + len(kinematics)
     declared = [row for row in listed if row.verdict in (EXPECTED_FAIL, UNEXPECTED_PASS)]
-    bad, doubtful = _bad(checks, declared, kinematics, cases), _doubtful(checks, made)
+    bad, doubtful = _bad(checks, broken, declared, kinematics, cases), _doubtful(checks, made)
     missing = [name for name, case in cases.items() if case.status not in COMPUTED]
     lost = [f"{len(missing)} of {_cases(len(cases))} could not be computed ({', '.join(missing)})"] if missing else []
     held = _held(checks, made, declared, len(cases) - len(missing))
@@ -127,18 +128,26 @@ def conclude(rows: Iterable[Judged], cases: Mapping[str, CaseOutcome]) -> Conclu
 
 
 def _bad(
-    checks: Sequence[Judged], declared: Sequence[Judged], kinematics: Sequence[str], cases: Mapping[str, CaseOutcome]
+    checks: Sequence[Judged],
+    broken: Sequence[Judged],
+    declared: Sequence[Judged],
+    kinematics: Sequence[str],
+    cases: Mapping[str, CaseOutcome],
 ) -> list[str]:
     failed = [row for row in checks if row.verdict == FAIL]
     off = sum(verdict == FAIL for verdict in kinematics)
     unseen = [row for row in declared if row.verdict == UNEXPECTED_PASS]
     # a case can fail with every row within its bound: its kinematics disagree, and its message says so
-    accused = {row.case for row in (*checks, *declared) if row.verdict in FAILURES}
+    accused = {row.case for row in (*checks, *broken, *declared) if row.verdict in FAILURES}
     accused |= {name for name, case in cases.items() if FAIL in case.kinematics}
     other = [name for name, case in cases.items() if case.status == "failed" and name not in accused]
     bad = []
     if failed:
         bad.append(f"{len(failed)} of {len(checks)} checks exceed their bounds ({_worst(failed)})")
+    if broken:
+        rows = "1 row" if len(broken) == 1 else f"{len(broken)} rows"
+        names = ", ".join(dict.fromkeys(row.candidate for row in broken))
+        bad.append(f"{rows} of formulas without a bound broke down ({names})")
     if off:
         bad.append(f"{off} of {len(kinematics)} checks of kinematics exceed their bounds")
     if unseen:
@@ -172,10 +181,9 @@ def _held(checks: Sequence[Judged], made: int, declared: Sequence[Judged], cases
 
 def _worst(rows: Sequence[Judged]) -> str:
     row = max(rows, key=_badness)
-    against = f"a bound of {row.bound:.4g}" if row.bound else "no bound, but the formula broke down"
     return (
         f"worst is {row.candidate} on joint {row.joint} in case {row.case}: {row.peak_error:.2e} of the reference's"
-        f" peak against {against}"
+        f" peak against a bound of {row.bound:.4g}"
     )
 
 

@@ -86,6 +86,11 @@ class Robot(RobotIdentity):
         """The parameters by name, SI."""
         return dict(self._values)
 
+    @property
+    def file_values(self) -> Mapping[str, float]:
+        """The parameters as the model's file has them, before any change, SI."""
+        return dict(self._base.loaded.values or {})
+
     def with_parameters(self, **changes: float) -> Robot:
         """Return a new robot with some parameters changed.
 

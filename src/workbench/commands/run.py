@@ -19,7 +19,7 @@ def run(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Run directory; an earlier run in it is replaced, a sweep gone on with. Default: reports/NAME.",
+            help="Run directory; an earlier run of the same is replaced, a sweep gone on with. Default: reports/NAME.",
         ),
     ] = None,
     only: Annotated[
@@ -45,6 +45,20 @@ def run(
     ] = True,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check everything; print cases, samples, time and disk; write nothing.")
+    ] = False,
+    keep_going: Annotated[
+        bool,
+        typer.Option(
+            "--keep-going",
+            help="Record cases that cannot be driven, with the nearest pose that can; run the others, as sweeps do.",
+        ),
+    ] = False,
+    replace: Annotated[
+        bool,
+        typer.Option(
+            "--replace",
+            help="Replace an earlier run of another robot, of other cases or candidates, once this is done.",
+        ),
     ] = False,
     jobs: Annotated[int | None, typer.Option(min=1, help="Workers of a sweep. Default: one per core.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Start a sweep over; drops what is finished.")] = False,
@@ -96,7 +110,7 @@ def run(
                 settings=values,
                 command=command,
                 effort=effort,
-                options=SweepOptions(jobs, scheduler, fresh, retry_failed),
+                options=SweepOptions(jobs, scheduler, fresh, retry_failed, replace),
                 candidates=candidates or (),
                 report=report_apart,
             )
@@ -124,6 +138,8 @@ def run(
                 candidates=candidates or (),
                 pick=pick_cases,
                 explain=brief,
+                keep_going=keep_going,
+                replace=replace,
             )
         print_outcome(outcome)
         code = outcome.conclusion.exit_code

@@ -26,7 +26,7 @@ from workbench.report.svg import StyleSheet, inline, standalone
 from workbench.report.sweep.load import SweepRun, load_sweep
 from workbench.report.sweep.sections import sweep_sections
 from workbench.report.text import fenced, finalize_markdown
-from workbench.report.verdict_section import circumstances
+from workbench.report.verdict_section import changes, circumstances
 
 FIGURES = "figures"
 TABLES = "tables"
@@ -163,6 +163,7 @@ def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
     text = page.render(
         manifest=run.manifest,
         circumstances=circumstances(run.manifest),
+        changes=changes(run.manifest),
         costs=cost_table(run.manifest),
         sections=bodies,
         style=Markup(style + sheet.rules),
@@ -197,6 +198,7 @@ def render_markdown(run: Run | SweepRun, sections: list[Section]) -> str:
     ]
     text = environment.get_template("report.md.j2").render(
         manifest=run.manifest,
+        changes=changes(run.manifest),
         circumstances=circumstances(run.manifest),
         costs=cost_table(run.manifest),
         sections=bodies,

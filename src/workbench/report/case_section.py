@@ -148,6 +148,8 @@ SHOWS = {
     "expected-failure": "Declared failures: formulas that are kept wrong on purpose, against the reference.",
     "modelling": "Modelling error: formulas against a reference that assumes something else, its masses for "
     "instance, so that a real difference is expected.",
+    "unbounded": "Measured, nothing judged: formulas without a bound, against the reference that makes the same "
+    "assumption about the masses.",
     "recorded": "Measured or simulated elsewhere: recorded torques against the reference on the recorded motion.",
     "contrast": "For contrast: MuJoCo's own mj_inverse, which does not project the loops' constraint forces out.",
 }
@@ -156,6 +158,8 @@ READING = {
     "expected-failure": f"A declared failure has to exceed its bound, every other row has to keep it. {ERRORS_DEFINED}",
     "modelling": "A measured result without a bound, in percent of the reference's own peak, or rms, on that joint; "
     f"the pointwise error leaves out samples below {100 * POINTWISE_FLOOR:g} % of that peak; “left out” counts them.",
+    "unbounded": "Nobody says how good these formulas have to be; a right one differs by round-off. In percent of the "
+    "reference's own peak, or rms, on that joint.",
     "recorded": "In percent of the reference's own peak, or rms, on that joint. “Uncertainty” is what the digits and "
     "the noise of motion and recorder leave open: in 95 % of cases the largest difference that they make is smaller.",
     "contrast": "Nothing judges these rows: they show why the reference projects. In percent of the reference's own "

@@ -23,6 +23,7 @@ ERROR = Status("error", "⚠", "ERROR, not computed", loud=True)
 MEASURED = Status("measured", "", "measured")
 HOLDS = Status("passed", "✓", "holds")
 REFUTED = Status("refuted", "✗", "does not hold")
+NOT_ABOUT = Status("unjudged", "–", "not about this robot")
 UNDECIDED = Status("undecided", "?", "cannot be decided")
 
 EXPECTED_FAIL = Status("expected", "≠", "declared failure, seen")
@@ -57,7 +58,7 @@ FAILURES = frozenset({"fail", "unexpected-pass", "undecided"})
 """Verdicts that fail a campaign."""
 CHECKED = frozenset({"pass", "fail", "undecided"})
 """Verdicts of rows that have a bound to keep."""
-KINDS = ("verification", "expected-failure", "modelling", "recorded", "contrast")
+KINDS = ("verification", "expected-failure", "modelling", "unbounded", "recorded", "contrast")
 """Families of rows, which a table never mixes."""
 
 CLAIM_STATUS = {True: HOLDS, False: REFUTED, None: UNDECIDED}

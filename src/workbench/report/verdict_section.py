@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from workbench.campaign.changed import sentences
 from workbench.report.concluded import LOOKS, conclusion_of
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
@@ -52,6 +53,11 @@ def circumstances(manifest: Manifest) -> tuple[str, ...]:
         f"Git commit {manifest.git_commit}" if manifest.git_commit else "",
     ]
     return tuple(f"{text}." for text in told if text)
+
+
+def changes(manifest: Manifest) -> list[str]:
+    """Say what was changed of the robot that the claims are about, a sentence each; empty where nothing was."""
+    return sentences(manifest.changes.model, manifest.changes.parameters, list(manifest.cases))
 
 
 def verdict(run: Run) -> tuple[Status, str]:

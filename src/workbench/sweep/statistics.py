@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from workbench.arrays import FloatArray
 from workbench.campaign.conclusion import Conclusion, conclude_sweep
 from workbench.campaign.spec import Campaign
-from workbench.campaign.verdict import CONTRAST, MODELLING, VERIFICATION
+from workbench.campaign.verdict import CONTRAST, MODELLING, UNBOUNDED, VERIFICATION, kind_of
 from workbench.sweep import files
 from workbench.sweep.identity import FORMAT
 from workbench.sweep.plan import Plan
@@ -38,14 +38,17 @@ def summarise(directory: Path, plan: Plan, campaign: Campaign) -> dict[str, Any]
     assert campaign.sweep is not None
     statuses, reasons, examples = _statuses(directory)
     errors = _errors(directory, plan, campaign)
-    kinds = {(c.name, c.reference): VERIFICATION if c.bound is not None else MODELLING for c in campaign.candidate}
+    own = {c.name: plan.robot.candidates[c.name].mass_model for c in campaign.candidate}
+    kinds = {
+        (c.name, c.reference): kind_of(c, own[c.name]) if c.bound is None else VERIFICATION for c in campaign.candidate
+    }
     rows = [
         {"candidate": candidate, "reference": reference, "kind": kinds[candidate, reference], "joint": joint}
         | _distribution(values, plan, campaign.sweep.good)
         for (candidate, reference), table in errors.items()
         for joint, values in table.items()
     ]
-    measured = {pair: table for pair, table in errors.items() if kinds[pair] == MODELLING}
+    measured = {pair: table for pair, table in errors.items() if kinds[pair] in (MODELLING, UNBOUNDED)}
     return {
         "format": FORMAT,
         "campaign": campaign.name,
@@ -190,4 +193,5 @@ def _worst(pair: tuple[str, str], table: dict[str, FloatArray], plan: Plan) -> l
 
 def concluded(summary: Mapping[str, Any]) -> Conclusion:
     """The verdict on a sweep from its summary."""
-    return conclude_sweep(summary["counts"], any(row["kind"] == VERIFICATION for row in summary["errors"]))
+    bounded = any(row["kind"] == VERIFICATION for row in summary["errors"])
+    return conclude_sweep(summary["counts"], bounded)
