@@ -10,9 +10,10 @@ import pytest
 
 from workbench.campaign.candidate_spec import CandidateSpec
 from workbench.campaign.claims import judge_claims
-from workbench.campaign.evidence import Evidence
+from workbench.campaign.evidence import Evidence, check_engines
 from workbench.campaign.spec import Campaign, CaseSpec, ClaimSpec
 from workbench.campaign.verdict import FAILURES, kind_of, verdict_of
+from workbench.errors import SpecError
 from workbench.reference.power import PLAIN, PowerBalance
 
 BOUND = 1e-10
@@ -200,3 +201,11 @@ def test_what_a_claim_measures(measure: dict[str, object], measured: float | Non
 )
 def test_whether_a_claim_holds(kind: str, claimed: float, within: float, holds: bool) -> None:
     assert judged(kind, claimed, within, quantity="peak_error") == (0.7, holds)
+
+
+def test_mujoco_is_the_reference_and_unknown_engines_are_refused() -> None:
+    check_engines(("mujoco",))
+    with pytest.raises(SpecError, match="mujoco is the reference and cannot be left out"):
+        check_engines(("pinocchio",))
+    with pytest.raises(SpecError, match='unknown engine "mujocco"; did you mean "mujoco"'):
+        check_engines(("mujocco",))
