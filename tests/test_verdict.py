@@ -66,7 +66,9 @@ def test_what_fails_a_campaign() -> None:
 
 
 def test_kinds_of_rows() -> None:
-    assert [kind_of(one) for one in (PLAINLY, DECLARED, MEASURED)] == ["verification", "expected-failure", "modelling"]
+    found = [kind_of(one, "distributed") for one in (PLAINLY, DECLARED, MEASURED)]
+    assert found == ["verification", "expected-failure", "modelling"]
+    assert kind_of(MEASURED, "lumped") == "unbounded"
 
 
 def test_a_declared_failure_needs_a_bound() -> None:
@@ -154,9 +156,9 @@ def judged(kind: str, claimed: float, within: float = 0.0, **measure: object) ->
         measure={"case": "one"} | measure,
     )  # type: ignore[arg-type]
     names = ("case", "candidate", "reference", "joint", "peak_error", "rms_error")
-    rows = [SimpleNamespace(**dict(zip(names, row, strict=True))) for row in ROWS]
+    rows = [SimpleNamespace(kind="verification", **dict(zip(names, row, strict=True))) for row in ROWS]
     campaign = Campaign.model_construct(claim=[claim])
-    (found,) = judge_claims(campaign, rows, FACTS)  # type: ignore[arg-type]
+    (found,) = judge_claims(campaign, {"x", "y"}, rows, FACTS, {}, None)  # type: ignore[arg-type]
     assert (found["id"], found["claimed"], found["kind"], found["within"]) == ("c", claimed, kind, within)
     return found["measured"], found["holds"]
 
