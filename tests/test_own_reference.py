@@ -61,6 +61,32 @@ def test_torques_of_excess_actuators_have_least_norm_and_do_the_same_work(
     assert balance.relative < 1e-9
 
 
+def test_dry_friction_of_each_excess_actuator_is_its_own(tmp_path: Path, single: MujocoReference) -> None:
+    crank, wrist, elbow = 0.7, 0.4, 0.3
+
+    def rubbing(**joints: float) -> MujocoReference:
+        text = FOURBAR
+        for name, loss in joints.items():
+            text = text.replace(f'<joint name="{name}"', f'<joint name="{name}" frictionloss="{loss}"')
+        return reference(tmp_path, text, ("crank", "wrist"), initial=GUESS)
+
+    one = whole_turn(single)
+    motion = one.qpos[:, [0, 2]], one.qvel[:, [0, 2]], one.qacc[:, [0, 2]]
+    qd = motion[1]
+    ways = np.where(np.abs(qd) > 1e-9, np.sign(qd), 0.0)
+    assert {-1.0, 1.0} <= set(ways[:, 1]), "the wrist turns back on the way"
+    smooth = rubbing().inverse_dynamics(*motion).tau
+    rough = rubbing(crank=crank, wrist=wrist)
+    added = rough.inverse_dynamics(*motion).tau - smooth
+    assert np.abs(added - ways * [crank, wrist]).max() < 1e-13
+    assert power_balance(rough, *motion).relative < 1e-9
+    # friction of a passive joint is work for both, shared like any other
+    shared = rubbing(elbow=elbow).inverse_dynamics(*motion).tau - smooth
+    work = elbow * np.abs(one.qvel[:, 1])
+    assert np.abs((shared * qd).sum(axis=1) - work).max() < 1e-13
+    assert np.abs(shared - qd * (work / (qd**2).sum(axis=1))[:, None]).max() < 1e-13
+
+
 @pytest.mark.parametrize("which", [0, 1, 2])
 def test_what_excess_actuators_cannot_do_together_is_refused(
     tmp_path: Path, single: MujocoReference, which: int
@@ -83,6 +109,18 @@ def test_a_parallelogram_driven_at_both_cranks_shares_the_load_evenly(tmp_path: 
     # weight of two cranks at half their length and of the coupler at the whole, on both motors
     expected = 9.81 * 0.2 * np.cos(q[:, 0]) * (0.3 + 0.8) / 2
     assert np.abs(tau[:, 0] - expected).max() < 1e-12
+
+
+@pytest.mark.parametrize("rate", [0.0, 2.0])
+def test_a_parallelogram_laid_flat_is_refused_even_at_rest(tmp_path: Path, rate: float) -> None:
+    """Flat, it may go on as an antiparallelogram: the loops close to rounding there, and determine nothing."""
+    one = reference(tmp_path, PARALLELOGRAM, ("left",), initial=(("left", 1.0), ("right", 1.0), ("hinge", -1.0)))
+    q = np.array([[0.5], [0.0]])
+    for short in (0.5, 1e-3):  # a thousandth short of it all is well
+        near = one.inverse_dynamics([[short]], [[rate]], [[0.0]])
+        assert np.abs(near.qpos - [short, -short, short]).max() < 1e-12
+    with pytest.raises(MotionError, match=r"^sample 1, joint (hinge|right): singular pose at left = 0;"):
+        one.inverse_dynamics(q, np.full_like(q, rate), 0 * q)
 
 
 ROD = '<geom type="capsule" fromto="0 0 0 .5 0 0" size=".01" mass=".5"/>'

@@ -274,7 +274,8 @@ def _resolve(
         else:
             motion = planned
         x, xd, xdd = robot.platform_along(motion.t, motion.q, motion.qd, motion.qdd)
-        robot.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
+        if robot.closed_form is not None:  # else the reference has just computed these torques
+            robot.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
     except MotionError as error:
         if nearest and isinstance(planned, JointMotion):
             error = with_nearest_joints(error, robot, planned.q)

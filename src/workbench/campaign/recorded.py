@@ -89,7 +89,7 @@ def recorded_motion(spec: RecordedMotion, path: Path, robot: Robot) -> Estimated
         raise MotionError(f"{path}: {len(found.t)} samples")
     try:
         smoothed = tuple(
-            smooth(found.t, column, written.sigma) for column, written in zip(found.q.T, found.written_q, strict=True)
+            smooth(found.t, column, written.half) for column, written in zip(found.q.T, found.written_q, strict=True)
         )
     except MotionError as error:
         raise MotionError(f"{path}: {error}", **error.facts) from error
@@ -249,7 +249,7 @@ def _noise(record: Record) -> FloatArray:
         return np.array([written.sigma for written in record.written_tau])
     return np.array(
         [
-            smooth(record.t, column, written.sigma).sigma
+            smooth(record.t, column, written.half).sigma
             for column, written in zip(record.tau.T, record.written_tau, strict=True)
         ]
     )

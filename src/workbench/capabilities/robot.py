@@ -374,18 +374,27 @@ class Robot(RobotIdentity):
 
     # what a reader should know
 
-    def warnings(self, t: FloatArray, q: FloatArray, qd: FloatArray | None = None) -> list[str]:
+    def warnings(
+        self,
+        t: FloatArray,
+        q: FloatArray,
+        qd: FloatArray | None = None,
+        measures: Mapping[str, FloatArray] | None = None,
+    ) -> list[str]:
         """What a reader of a case's results should know: poses near a singularity, friction at rest, millimetres.
 
         Parameters
         ----------
         t, q, qd
             Times ``(n,)`` in seconds, actuated coordinates and, where friction matters, their rates ``(n, na)``.
+        measures
+            What `singularity_measures` gives at *q*, where it is at hand.
         """
         found = [] if qd is None or self.closed_form is None else self.closed_form.friction_warnings(qd)
         if self.closed_form is None:
             found += reference_warnings(self, qd)
-        return [*found, *near_singular_warnings(self, t, q), *self.millimetre_warnings()]
+        near = self.singularity_measures(q) if measures is None else measures
+        return [*found, *near_singular_warnings(t, near), *self.millimetre_warnings()]
 
     def millimetre_warnings(self) -> list[str]:
         """Lengths that were most likely written in millimetres."""

@@ -6,7 +6,6 @@ in rates, but for friction. So few states at each pose take it apart exactly, an
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -16,14 +15,12 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.diagnosis.subject import Subject
 from workbench.errors import MotionError
+from workbench.reference import MujocoReference
 
 POSES = 40
 SEED = 20100
 MIXED = 3
 """States with all rates, accelerations and forces at once, which must be the sum of what was found apart."""
-
-PATIENCE_S = 5.0
-"""Longest time that a formula which fails on some states is asked state by state; the others stay unknown."""
 
 JITTER = 0.08
 """How far a pose is moved off the motion, as a fraction of the motion's range: so that no two joints go alike."""
@@ -73,19 +70,26 @@ def choose_poses(subject: Subject, count: int = POSES) -> FloatArray:
     reference = subject.reference({})
     if reference.excess_actuators:
         return np.asarray(picked)
+    if _in_reach(reference, moved):
+        return np.asarray(moved)
     return np.array([_reached(reference, kept, aim) for kept, aim in zip(picked, moved, strict=True)])
 
 
-def _reached(reference: object, kept: FloatArray, aim: FloatArray) -> FloatArray:
+def _in_reach(reference: MujocoReference, poses: FloatArray) -> bool:
+    zero = np.zeros_like(poses)
+    try:
+        reference.inverse_dynamics(poses, zero, zero)
+    except MotionError:
+        return False
+    return True
+
+
+def _reached(reference: MujocoReference, kept: FloatArray, aim: FloatArray) -> FloatArray:
     """The nearest point to *aim*, on the way from a pose of the motion, that is in reach."""
     for share in (1.0, 0.3, 0.1):
         pose = kept + share * (aim - kept)
-        zero = np.zeros_like(pose)[None]
-        try:
-            reference.inverse_dynamics(pose[None], zero, zero)  # type: ignore[attr-defined]
-        except MotionError:
-            continue
-        return np.asarray(pose)
+        if _in_reach(reference, pose[None]):
+            return np.asarray(pose)
     return kept
 
 
@@ -144,7 +148,9 @@ Torques = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 
 
 def ask(plan: Plan, torques: Torques) -> tuple[FloatArray, dict[tuple[str | int, ...], str]]:
-    """Ask for the torques of all states; where some fail, state by state.
+    """Ask for the torques of all states; where some fail, pose by pose and probe by probe.
+
+    A pose at which the formula fails at rest and with everything moving is one at which it fails.
 
     Returns
     -------
@@ -159,19 +165,28 @@ def ask(plan: Plan, torques: Torques) -> tuple[FloatArray, dict[tuple[str | int,
         pass
     found = np.full(plan.q.shape, np.nan)
     failures: dict[tuple[str | int, ...], str] = {}
-    deadline = time.monotonic() + PATIENCE_S
-    for number, label in enumerate(plan.labels):
-        states = plan.q[number], plan.qd[number], plan.qdd[number], plan.force[number]
+    every = list(range(len(plan.labels)))
+
+    def answered(probes: list[int], poses: list[int]) -> bool:
+        states = (array[np.ix_(probes, poses)] for array in (plan.q, plan.qd, plan.qdd, plan.force))
         try:
-            found[number] = torques(*states)
-            continue
+            tau = torques(*(array.reshape(-1, array.shape[2]) for array in states))
         except WorkbenchError as error:
-            failures[label] = str(error)
-        for pose in range(plan.q.shape[1]):
-            if time.monotonic() > deadline:
-                break
-            try:
-                found[number, pose] = torques(*(array[pose : pose + 1] for array in states))[0]
-            except WorkbenchError:
-                continue
+            if len(probes) == 1:
+                failures.setdefault(plan.labels[probes[0]], str(error))
+            return False
+        found[np.ix_(probes, poses)] = tau.reshape(len(probes), len(poses), -1)
+        return True
+
+    poses = [pose for pose in range(plan.q.shape[1]) if not answered(every, [pose])]
+    if not poses:  # it fails only on all of them at once
+        return found, {plan.labels[0]: "it fails where all states are asked at once, and answers one pose at a time"}
+    hard = [probe for probe in every if not answered([probe], poses)]
+    ends = [probe for probe in hard if plan.labels[probe] in (("rest",), ("mixed", 0))]
+    for pose in poses:
+        fine = [answered([probe], [pose]) for probe in ends]
+        if len(ends) < 2 or any(fine):
+            for probe in hard:
+                if probe not in ends:
+                    answered([probe], [pose])
     return found, failures

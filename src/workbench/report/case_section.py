@@ -26,7 +26,7 @@ from workbench.report.plot import Plot
 from workbench.report.recorded import recorded_tables
 from workbench.report.spent import spent_plot, spent_table
 from workbench.report.tables import CASE_STATUS, KINDS, Cell, Status, Table, columns, verdict_status
-from workbench.report.text import error_fraction, exact, percent, pretty_unit, scientific, with_unit
+from workbench.report.text import error_fraction, exact, percent, scientific, torque_label, with_unit
 
 ERRORS_DEFINED = (
     "Peak error is max|Δτ| / max|τ_ref|, rms error is rms(Δτ) / rms(τ_ref), both per joint over the whole case, so "
@@ -211,5 +211,5 @@ def _error_table(run: Run, case: str, kind: str, rows: list[ErrorRow], anchor: s
 
 
 def joint_heading(run: Run, joint: str) -> str:
-    """Return ``q1 [N]``: the joint with the unit of its force or torque."""
-    return f"{joint} [{pretty_unit(run.manifest.unit_of(joint))}]"
+    """Return ``τ1 [N]``: the generalized force of a joint with its unit."""
+    return torque_label(joint, run.manifest.unit_of(joint))
