@@ -42,6 +42,13 @@ def test_the_file_need_name_nothing(single: MujocoReference) -> None:
     assert found.acceleration_residual.max() < 1e-12
 
 
+@pytest.mark.parametrize("rate", [1e150, 1e200, 1e308])
+def test_rates_beyond_all_arithmetic_are_refused(single: MujocoReference, rate: float) -> None:
+    """Loops that close at no speed that a number can hold: an error, never an infinite torque or NaN."""
+    with pytest.raises(MotionError, match=r"^sample 1, joint \w+: "):
+        single.inverse_dynamics([[0.5], [0.5]], [[1.0], [rate]], [[0.0], [0.0]])
+
+
 def test_torques_of_excess_actuators_have_least_norm_and_do_the_same_work(
     tmp_path: Path, single: MujocoReference
 ) -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from workbench.campaign.candidate_spec import CandidateSpec
-from workbench.campaign.evidence import Evidence
-from workbench.campaign.spec import CaseSpec
+from workbench.campaign.claims import judge_claims
+from workbench.campaign.evidence import Evidence, check_engines
+from workbench.campaign.spec import Campaign, CaseSpec, ClaimSpec
 from workbench.campaign.verdict import FAILURES, kind_of, verdict_of
+from workbench.errors import SpecError
 from workbench.reference.power import PLAIN, PowerBalance
 
 BOUND = 1e-10
@@ -63,7 +66,14 @@ def test_what_fails_a_campaign() -> None:
 
 
 def test_kinds_of_rows() -> None:
-    assert [kind_of(one) for one in (PLAINLY, DECLARED, MEASURED)] == ["verification", "expected-failure", "modelling"]
+    found = [kind_of(one, "distributed") for one in (PLAINLY, DECLARED, MEASURED)]
+    assert found == ["verification", "expected-failure", "modelling"]
+    assert kind_of(MEASURED, "lumped") == "unbounded"
+
+
+def test_a_declared_failure_needs_a_bound() -> None:
+    with pytest.raises(ValueError, match="expect_fail needs a bound"):
+        CandidateSpec(name="x", reference="lumped", expect_fail={"one": ["q1"]})
 
 
 def test_a_bound_of_the_case_goes_over_the_candidates() -> None:
@@ -116,3 +126,88 @@ def test_rounding_of_heavy_bodies_is_not_put_down_to_the_torques(
     relative: float, rounding: float, expected: float
 ) -> None:
     assert balance(relative, rounding).uncertainty == pytest.approx(expected, rel=1e-12)
+
+
+# claims: what a paper prints against what was measured
+
+ROWS = [
+    ("one", "x", "lumped", "q1", 0.03, 0.01),
+    ("one", "x", "lumped", "q2", 0.05, 0.02),
+    ("one", "x", "distributed", "q1", 0.5, 0.03),
+    ("one", "y", "lumped", "q1", 0.7, 0.04),
+    ("two", "x", "lumped", "q1", 0.9, 0.06),
+]
+"""case, candidate, reference, joint, peak error, rms error"""
+FACTS = {
+    "one": {"peak_speed": 2.5, "solutions_at_start": [[0.1, 0.2, 0.3], [0.1, -0.2, 0.3]]},
+    "two": {"peak_speed": None},
+}
+
+
+def judged(kind: str, claimed: float, within: float = 0.0, **measure: object) -> tuple[float | None, bool | None]:
+    claim = ClaimSpec(
+        id="c",
+        text="t",
+        source="s",
+        kind=kind,
+        claimed=claimed,
+        within=within,
+        unit="",
+        measure={"case": "one"} | measure,
+    )  # type: ignore[arg-type]
+    names = ("case", "candidate", "reference", "joint", "peak_error", "rms_error")
+    rows = [SimpleNamespace(kind="verification", **dict(zip(names, row, strict=True))) for row in ROWS]
+    campaign = Campaign.model_construct(claim=[claim])
+    (found,) = judge_claims(campaign, {"x", "y"}, rows, FACTS, {}, None)  # type: ignore[arg-type]
+    assert (found["id"], found["claimed"], found["kind"], found["within"]) == ("c", claimed, kind, within)
+    return found["measured"], found["holds"]
+
+
+@pytest.mark.parametrize(
+    ("measure", "measured"),
+    [
+        ({}, 0.7),
+        ({"candidate": "x"}, 0.5),
+        ({"candidate": "x", "reference": "lumped"}, 0.05),
+        ({"candidate": "x", "reference": "lumped", "joint": "q1"}, 0.03),
+        ({"reference": "distributed"}, 0.5),
+        ({"joint": "q2"}, 0.05),
+        ({"case": "two"}, 0.9),
+        ({"candidate": "z"}, None),
+        ({"case": "three"}, None),
+        ({"quantity": "rms_error", "candidate": "x"}, 0.03),
+        ({"quantity": "peak_speed"}, 2.5),
+        ({"quantity": "peak_speed", "case": "two"}, None),
+        ({"quantity": "peak_acceleration"}, None),
+        # the nearest solution, and of it the coordinate that is farthest off
+        ({"quantity": "solution_distance", "point": [0.1, -0.21, 0.35]}, 0.05),
+    ],
+)
+def test_what_a_claim_measures(measure: dict[str, object], measured: float | None) -> None:
+    found, holds = judged("upper", 1.0, **({"quantity": "peak_error"} | measure))
+    assert found == (None if measured is None else pytest.approx(measured, rel=1e-12))
+    assert (holds is None) == (measured is None)
+
+
+@pytest.mark.parametrize(
+    ("kind", "claimed", "within", "holds"),
+    [
+        ("upper", 0.71, 0.0, True),
+        ("upper", 0.7, 0.0, False),  # "less than" is less
+        ("upper", 0.69, 0.5, False),
+        ("value", 0.71, 0.02, True),
+        ("value", 0.69, 0.02, True),
+        ("value", 0.75, 0.02, False),
+        ("value", 0.65, 0.02, False),
+    ],
+)
+def test_whether_a_claim_holds(kind: str, claimed: float, within: float, holds: bool) -> None:
+    assert judged(kind, claimed, within, quantity="peak_error") == (0.7, holds)
+
+
+def test_mujoco_is_the_reference_and_unknown_engines_are_refused() -> None:
+    check_engines(("mujoco",))
+    with pytest.raises(SpecError, match="mujoco is the reference and cannot be left out"):
+        check_engines(("pinocchio",))
+    with pytest.raises(SpecError, match='unknown engine "mujocco"; did you mean "mujoco"'):
+        check_engines(("mujocco",))

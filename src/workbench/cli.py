@@ -26,6 +26,7 @@ from workbench.commands.new import new
 from workbench.commands.report import report
 from workbench.commands.run import run
 from workbench.commands.status import status
+from workbench.commands.studio import studio
 from workbench.commands.watch import watch
 from workbench.commands.workspace import workspace
 from workbench.errors import WorkbenchError
@@ -81,6 +82,7 @@ app.add_typer(model)
 app.command()(compare)
 app.command()(diagnose)
 app.command()(watch)
+app.command()(studio)
 
 
 def main() -> NoReturn:

@@ -52,18 +52,20 @@ def main() -> int:
     PLACE.mkdir(parents=True, exist_ok=True)
     tree.renew()
     trial.warm()
-    if options.reach or not REACHED.exists():
+    given = options.tests or options.short
+    if options.reach or not (REACHED.exists() or given):
         _reach(options.tests or modules.core_test_files(), REACHED)
     chosen = list(_chosen(options))
     kernels = any(modules.is_kernel(planted.module) for planted in chosen)
-    if options.reach_kernels or (kernels and not INTERPRETED.exists()):
+    if options.reach_kernels or (kernels and not (INTERPRETED.exists() or given)):
         _reach([modules.test_file(name) for name in modules.INTERPRETED_TESTS], INTERPRETED)
     known = {entry["key"]: entry for entry in _results()}
     for number, planted in enumerate(chosen, 1):
         before = known.get(planted.key)
         if before and (before["status"] == trial.KILLED or not options.again):
             continue
-        outcome, tests = _try(planted, options.budget)
+        files = options.tests or (modules.short_tests(planted.group, planted.module) if options.short else [])
+        outcome, tests = _try(planted, options.budget, files)
         entry = {"key": planted.key, "group": planted.group, "module": planted.module, **asdict(planted.mutant),
                  **asdict(outcome), "tests": tests}  # fmt: skip
         known[planted.key] = entry
@@ -89,9 +91,12 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--operator", default="", help="this operator alone")
     parser.add_argument("--line", type=int, help="faults of this line alone")
     parser.add_argument("--again", action="store_true", help="try again what survived before")
+    parser.add_argument(
+        "--short", action="store_true", help="whole test files of each group, no look at who reaches what"
+    )
     parser.add_argument("--reach", action="store_true", help="find anew which tests reach which lines")
     parser.add_argument("--reach-kernels", action="store_true", help="the same for kernels, uncompiled")
-    parser.add_argument("--tests", nargs="*", help="test files for --reach; default: the core tests")
+    parser.add_argument("--tests", nargs="*", help="test files for --reach, or to try faults with as they are")
     parser.add_argument("--list", action="store_true", help="show the faults, plant none")
     return parser.parse_args()
 
@@ -152,19 +157,26 @@ def _reach(files: list[str], place: Path) -> None:
     print(f"{len(new['durations'])} tests, {sum(new['durations'].values()):.0f} s; failed: {new['failed'] or 'none'}")
 
 
-def _try(planted: Planted, budget: float) -> tuple[trial.Outcome, int]:
+def _try(planted: Planted, budget: float, files: list[str]) -> tuple[trial.Outcome, int]:
+    """Try one fault: with the tests that reach it, or, where test *files* are given, with those."""
     kernel = modules.is_kernel(planted.module)
     text = tree.source_of(planted.module)
     with tree.planted(planted.module, planted.mutant.planted(text)):
-        outcome, tried = _try_reaching(planted, INTERPRETED if kernel else REACHED, budget)
-        if not kernel or outcome.status != trial.SURVIVED:
+        if files and kernel and not planted.module.startswith("reference/"):
+            with tree.own_cache() as cache:
+                outcome, tried = trial.trial(files, cache, BASELINE_LIMIT), len(files)
+        elif files:
+            outcome, tried = trial.trial(files, tree.CACHE, BASELINE_LIMIT, interpreted=kernel), len(files)
+        else:
+            outcome, tried = _try_reaching(planted, INTERPRETED if kernel else REACHED, budget)
+        if not kernel or files or outcome.status != trial.SURVIVED:
             return outcome, tried
-        files = set(modules.kernel_tests(planted.module))
+        compiled = modules.kernel_tests(planted.module)
         durations = json.loads(REACHED.read_text(encoding="utf-8"))["durations"]
-        limit = COMPILING + int(3 * sum(time for test, time in durations.items() if test.split("::")[0] in files))
+        limit = COMPILING + int(3 * sum(time for test, time in durations.items() if test.split("::")[0] in compiled))
         with tree.own_cache() as cache:
-            second = trial.trial(modules.kernel_tests(planted.module), cache, limit)
-        return trial.Outcome(second.status, second.by, outcome.seconds + second.seconds), tried + len(files)
+            second = trial.trial(compiled, cache, limit)
+        return trial.Outcome(second.status, second.by, outcome.seconds + second.seconds), tried + len(compiled)
 
 
 def _try_reaching(planted: Planted, place: Path, budget: float) -> tuple[trial.Outcome, int]:

@@ -42,8 +42,30 @@ KERNEL_TESTS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Beginnings of the names of files with kernels, the first that fits: tests of the compiled kernels."""
 
+UNCOMPILED = ("closure_kinds", "own_reference")
+"""Of these the quickest."""
+
 INTERPRETED_TESTS = ("reference_linear", "closure_kinds", "own_reference", "reactions", "idle_rods", "task_coordinates")
 """Small enough to run with all kernels uncompiled."""
+
+
+GROUP_TESTS: dict[str, tuple[str, ...]] = {
+    "metrics": ("metrics",),
+    "verdict": ("verdict", "compare_case"),
+    "comparison": ("verdict", "compare_case"),
+    "mjcf": ("mjcf_setup", "mjcf_roundtrip", "mjcf_source", "mjcf_assumptions"),
+    "robots": ("agreement", "body_numbers", "screws", "asym_kernel", "planar_4rprp", "mass_models", "mjcf_roundtrip"),
+    "reference": ("reference_linear", "closure_kinds", "own_reference", "counted_forces", "reference_closure"),
+}
+"""The tests of each group that a short run tries, in this order, without knowing who reaches what."""
+
+
+def short_tests(group: str, module: str) -> list[str]:
+    """Test files of a short run."""
+    names = GROUP_TESTS[group]
+    if is_kernel(module):
+        names = UNCOMPILED if module.startswith("reference/") else KERNEL_TESTS[f"{module.rpartition('/')[0]}/"]
+    return [test_file(name) for name in names]
 
 
 def files_of(group: str) -> list[str]:

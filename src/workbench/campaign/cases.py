@@ -264,7 +264,26 @@ def _resolve(
     for joint in spec.bounds:
         if joint not in robot.joints:
             raise SpecError(f'bounds: no joint "{joint}"{did_you_mean(joint, robot.joints)}')
-    planned = plan_motion(spec, file, robot)
+    return case_on(spec, model, overrides, robot, plan_motion(spec, file, robot), nearest)
+
+
+def case_on(
+    spec: CaseSpec,
+    model: Path,
+    overrides: dict[str, float],
+    robot: Robot,
+    planned: JointMotion | PlatformMotion,
+    nearest: bool = False,
+) -> Case:
+    """Put a robot on a motion that has been planned, by `plan_motion` or by other means.
+
+    With *nearest* an error of a motion of joints names the nearest coordinates that can be driven.
+
+    Raises
+    ------
+    MotionError
+        Too many samples, or a pose out of reach; the message names the time.
+    """
     if len(planned.t) > MAX_SAMPLES:
         raise MotionError(f"motion: {len(planned.t)} samples; allowed: at most {MAX_SAMPLES}", value=len(planned.t))
     try:

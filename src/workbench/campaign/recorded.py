@@ -34,7 +34,7 @@ FINE = 1e-3
 """Of the peak torque: what agreement should be worth where no bound is given."""
 
 ALARM = 1.5
-"""Widths of the band from which on torques differ: rounding is no Gaussian noise, and a false alarm costs days."""
+"""Widths of the band from which on torques differ: one joint in twenty leaves the band, and false alarms cost days."""
 
 NOISE_DRAWN_FROM = 24
 """Samples of torques; fewer say nothing of their own noise."""

@@ -20,7 +20,7 @@ from workbench.diagnosis.result import FAILURE, KINEMATICS, NUMERIC, Diagnosis, 
 from workbench.diagnosis.sentences import dynamic_findings, list_of, plain_findings
 from workbench.diagnosis.shares import Share, both_sides, share_of
 from workbench.diagnosis.structure import structure_findings
-from workbench.diagnosis.subject import AFFINE, Subject
+from workbench.diagnosis.subject import AFFINE, GRAVITY, Subject
 from workbench.errors import WorkbenchError
 
 SHARE_POSES = 6
@@ -33,6 +33,9 @@ ROUNDED = 2e-3
 
 TERM = 0.02
 """Of a parameter's share: an error as large as this is a term, however little it matters for this robot."""
+
+LOUD = 1e-4
+"""Of a joint's largest part: where a formula's numbers are noisier, what parameters are worth cannot be told."""
 
 MOST_NAMED = 6
 """Findings about dynamics that are written out; a formula that is wrong all over is not served by more."""
@@ -78,15 +81,27 @@ def examine(
     if failures and FEWEST_POSES <= whole.sum() < len(whole):
         # a formula that fails at some poses, outside of a root's range for instance, is looked at where it answers
         notes.append(f"{(~whole).sum()} of {len(whole)} poses, at which the formula fails")
-        plan = make_plan(subject, plan.poses[whole])
+        plan = plan.of(np.flatnonzero(whole))
         formula, reference, _ = both_sides(subject, plan, {})
+    elif failures:
+        # from motion alone come a column for each acceleration, one for each force, and a check
+        plan = make_plan(subject, plan.poses, len(subject.joints) + 4)
+        formula, reference, failures = both_sides(subject, plan, {})
     floors = floors_of(reference)
     noises = noise_of(subject, plan, floors)
     jumps = noises > JUMP
+    if FEWEST_POSES <= (~jumps).sum() < len(jumps) and _wrong_somewhere(formula, reference, floors, noises, ~jumps):
+        notes.append(
+            f"{jumps.sum()} of {len(jumps)} poses: the torques jump there between poses that are as good as the same,"
+            " as where an iteration inside does not converge"
+        )
+        calm = np.flatnonzero(~jumps)
+        plan, noises, jumps = plan.of(calm), noises[calm], jumps[calm]
+        formula, reference = ({part: tau[calm] for part, tau in parts.items()} for parts in (formula, reference))
     if noises.any() and not jumps.any():
         # the quietest poses first: parameters are varied at the first few
         order = np.argsort(noises, kind="stable")
-        plan, noises = make_plan(subject, plan.poses[order]), noises[order]
+        plan, noises = plan.of(order), noises[order]
         formula, reference = ({part: tau[order] for part, tau in parts.items()} for parts in (formula, reference))
     noise = float(noises[min(SHARE_POSES, len(noises)) - 1]) if not jumps.any() else 0.0
     noises = np.where(jumps, 0.0, noises)
@@ -94,13 +109,13 @@ def examine(
     shares: list[Share] = []
     few = plan.at(SHARE_POSES)
     mine, theirs = ({part: tau[:SHARE_POSES] for part, tau in parts.items()} for parts in (formula, reference))
-    if parameters and noise == 0.0 and not jumps.any() and not subject.reference({}).excess_actuators:
+    if parameters and noise < LOUD and not jumps.any() and not subject.reference({}).excess_actuators:
         wrong = any(entry.status == WRONG_MARK for entry in entries)
         refused = []
         for parameter in subject.parameters:
             if parameter.kind not in AFFINE or not (parameter.read or wrong):
                 continue
-            share = share_of(subject, few, parameter, mine, theirs, floors)
+            share = share_of(subject, few, parameter, mine, theirs, floors, 4 * SAFETY * noises[:SHARE_POSES])
             if share is None:
                 refused.append(parameter.name)
             else:
@@ -109,11 +124,12 @@ def examine(
             notes.append(f"parameter {list_of(refused)}: one of the sides refuses another value")
     elif parameters and jumps.any():
         notes.append("parameters one by one: the formula's numbers jump from pose to pose")
-    elif parameters and noise:
+    elif parameters and noise >= LOUD:
         notes.append("parameters one by one: the formula's numbers are too noisy for differences of torques")
     if parameters and subject.no_parameters:
         notes.append(f"parameters: {subject.no_parameters}")
-    jacobian = wrong_jacobian(formula, reference, shares, subject.joints)
+    notes += _unanswered(entries, subject.joints)
+    jacobian = wrong_jacobian(formula, reference, shares, subject.joints, 10 * SAFETY * noise)
     return Examined(plan, formula, reference, floors, entries, shares, noise, noises, jumps, jacobian), notes, failures
 
 
@@ -203,6 +219,29 @@ def _unnamed(wrong: Sequence[Entry], joints: tuple[str, ...]) -> Finding:
     return Finding("dynamics", f"{list_of(labels)} of {list_of(where)}: wrong", where, tuple(labels))
 
 
+def _unanswered(entries: Sequence[Entry], joints: tuple[str, ...]) -> list[str]:
+    """Say which parts cannot be told from the states that the formula answers."""
+    unknown = list(dict.fromkeys(e.part for e in entries if e.status == UNKNOWN_MARK))
+    if not unknown or len(unknown) == len({e.part for e in entries}):
+        return []
+    found = []
+    parts = [part.label(joints) for part in unknown if part.kind not in (ODD, REST)]
+    if parts:
+        found.append(f"{list_of(parts)}: the formula answers too few states to tell them from the other parts")
+    if len(parts) < len(unknown):
+        found.append("whether the torque is affine in accelerations and quadratic in rates: it takes states at rest")
+    return found
+
+
+def _wrong_somewhere(
+    formula: Parts, reference: Parts, floors: FloatArray, noises: FloatArray, poses: NDArray[np.bool_]
+) -> bool:
+    """Whether any entry is wrong at some of the poses."""
+    mine, theirs = ({part: tau[poses] for part, tau in parts.items()} for parts in (formula, reference))
+    entries = compare_parts(mine, theirs, floors, noise=SAFETY * noises[poses])
+    return any(entry.status == WRONG_MARK for entry in entries)
+
+
 def _of_entries(kind: str, text: str, wrong: Sequence[Entry], joints: tuple[str, ...]) -> Finding:
     where = tuple(dict.fromkeys(joints[e.joint] for e in wrong))
     labels = tuple(dict.fromkeys(e.part.label(joints) for e in wrong))
@@ -216,12 +255,11 @@ def _jumping(seen: Examined, joints: tuple[str, ...]) -> Finding:
         f"kinematics first: at {jumps.sum()} of {len(jumps)} poses the torques jump between poses that are as good as"
         " the same: an iteration inside does not converge there, or ends on one branch and then on another"
     )
-    mine, theirs = ({part: tau[~jumps] for part, tau in parts.items()} for parts in (seen.formula, seen.reference))
     if not jumps.all():
-        left = compare_parts(mine, theirs, seen.floors, noise=SAFETY * seen.noises[~jumps])
-        off = [e for e in left if e.status == WRONG_MARK]
-        share = f"{len(off)} entries are wrong there too" if off else "everything is right there"
-        text += f"; at the others it is smooth, and {share}"
+        wrong_there = _wrong_somewhere(seen.formula, seen.reference, seen.floors, seen.noises, ~jumps)
+        text += (
+            f"; at the others it is smooth, and {'not right either' if wrong_there else 'everything is right there'}"
+        )
     return _of_entries(KINEMATICS, text, wrong, joints)
 
 
@@ -253,7 +291,8 @@ def _rounded(seen: Examined, joints: tuple[str, ...]) -> Finding | None:
         " off in any), as where constants are rounded, derivatives are taken by finite differences or an iteration"
         " ends early"
     )
-    shares_off = tuple(share.parameter.name for share in seen.shares if share.parameter.read and share.wrong)
+    off = [share.parameter for share in seen.shares if share.parameter.read and share.wrong]
+    shares_off = tuple(p.name for p in off if p.kind != GRAVITY) or tuple(p.name for p in off)
     if shares_off:
         text += f"; seen in what {list_of(shares_off)} {'is' if len(shares_off) == 1 else 'are'} worth"
     return replace(_of_entries(NUMERIC, text, wrong, joints), parameters=shares_off)

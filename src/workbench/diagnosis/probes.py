@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.arrays import FloatArray
 from workbench.diagnosis.subject import Subject
@@ -52,9 +53,13 @@ class Plan:
 
     def at(self, poses: int) -> Plan:
         """The same probes at the first few poses."""
+        return self.of(np.arange(min(poses, len(self.poses))))
+
+    def of(self, poses: NDArray[np.int_]) -> Plan:
+        """The same probes at some of the poses, by number."""
         return Plan(
-            self.labels, self.q[:, :poses], self.qd[:, :poses], self.qdd[:, :poses], self.force[:, :poses],
-            self.rates, self.accelerations, self.push, self.poses[:poses],
+            self.labels, self.q[:, poses], self.qd[:, poses], self.qdd[:, poses], self.force[:, poses],
+            self.rates, self.accelerations, self.push, self.poses[poses],
         )  # fmt: skip
 
 
@@ -93,8 +98,11 @@ def _reached(reference: MujocoReference, kept: FloatArray, aim: FloatArray) -> F
     return kept
 
 
-def make_plan(subject: Subject, poses: FloatArray) -> Plan:
-    """Lay out the states: sizes of rates and accelerations are those of the motions, so that parts weigh as there."""
+def make_plan(subject: Subject, poses: FloatArray, mixed: int = MIXED) -> Plan:
+    """Lay out the states: sizes of rates and accelerations are those of the motions, so that parts weigh as there.
+
+    *mixed* is the number of states with everything at once; of a formula that fails at rest they tell the parts.
+    """
     s, na = poses.shape
     rates = _typical(subject.motion[1], 1.0)
     accelerations = _typical(subject.motion[2], 10.0)
@@ -119,7 +127,7 @@ def make_plan(subject: Subject, poses: FloatArray) -> Plan:
     for axis in range(3):
         add(("force", axis), zero, zero, push * np.eye(3)[axis])
     rng = np.random.default_rng(SEED + 1)
-    for number in range(MIXED):
+    for number in range(mixed):
         sign = rng.choice([-1.0, 1.0], na)
         sizes = rng.uniform(0.4, 1.0, (3, max(na, 3)))
         turn = rng.choice([-1.0, 1.0], 3)

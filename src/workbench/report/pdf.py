@@ -27,7 +27,7 @@ from workbench.report.style import PAPERS
 from workbench.report.svg import standalone
 from workbench.report.sweep.load import SweepRun
 from workbench.report.tables import Cell, Status, Table
-from workbench.report.verdict_section import CHANGED, changes, circumstances
+from workbench.report.verdict_section import changes, circumstances
 
 FULL_WIDTH_FROM = 7.0
 """inches: figures designed wider than this take the whole width of the page"""
@@ -35,6 +35,10 @@ LONG = 36
 """Letters from which on a column of a table breaks its lines."""
 FONTS = {"page": "DejaVu Sans", "paper": "DejaVu Serif"}
 """Letters of drawings, by style: those that matplotlib brings and has measured them with."""
+CHANGED = (
+    "Another robot than the one that the campaign is about. Claims about that one are not judged where this concerns"
+    " them."
+)
 FIGURE = """#set document(date: none)
 #set page(width: auto, height: auto, margin: 0pt)
 #image("figure.svg")
@@ -54,7 +58,7 @@ def report_pdf(run: Run | SweepRun, sections: Sequence[Section], style: str = "p
         "description": manifest.description,
         "run": " ".join(circumstances(manifest)),
         "changed": CHANGED,
-        "changes": changes(manifest),
+        "changes": list(changes(manifest)),
         "paper": PAPERS[paper],
         "costs": _table(costs) if costs else None,
         "sections": [
@@ -140,8 +144,7 @@ def _figures(section: Section, views: Iterable[Any], style: str, parts: dict[str
     titles = {}
     for view in views:
         record = view.record
-        other = f"Not for the robot of the source: {record.not_about}." if record.not_about else ""
-        told = " ".join(text for text in (record.title, f"{record.source}." if record.source else "", other) if text)
+        told = " ".join(text for text in (record.title, f"{record.source}." if record.source else "") if text)
         if view.plot is None:
             yield _text(f"{told} {view.missing}")
         else:

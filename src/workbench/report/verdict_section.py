@@ -9,12 +9,6 @@ from workbench.report.manifest import Manifest
 from workbench.report.section import Section
 from workbench.report.tables import Cell, Status, Table, columns
 
-CHANGED = (
-    "Another robot than the one that the campaign is about. Claims about that one are not judged where this concerns"
-    " them."
-)
-"""What stands above the list of changes."""
-
 
 def verdict_section(run: Run) -> Section:
     """Say in one sentence whether every bound holds, and list the formulas that were tested."""
