@@ -139,8 +139,9 @@ ROWS = [
 ]
 """case, candidate, reference, joint, peak error, rms error"""
 FACTS = {
-    "one": {"peak_speed": 2.5, "solutions_at_start": [[0.1, 0.2, 0.3], [0.1, -0.2, 0.3]]},
-    "two": {"peak_speed": None},
+    "one": {"closure_residual": 0.0, "peak_speed": 2.5, "solutions_at_start": [[0.1, 0.2, 0.3], [0.1, -0.2, 0.3]]},
+    "two": {"closure_residual": 0.0, "peak_speed": None},
+    "not driven": {},
 }
 
 
@@ -175,6 +176,7 @@ def judged(kind: str, claimed: float, within: float = 0.0, **measure: object) ->
         ({"case": "two"}, 0.9),
         ({"candidate": "z"}, None),
         ({"case": "three"}, None),
+        ({"case": "not driven", "quantity": "peak_speed"}, None),
         ({"quantity": "rms_error", "candidate": "x"}, 0.03),
         ({"quantity": "peak_speed"}, 2.5),
         ({"quantity": "peak_speed", "case": "two"}, None),
