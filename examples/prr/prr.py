@@ -110,5 +110,5 @@ def inverse(p, x):
 
 @workbench.jacobian
 def jacobian(p, q):
-    """xd = J qd for (x, z, ry)."""
+    """Rates of (x, z, ry): xd = J qd."""
     return joint_to_pose(p, q) * np.array([1.0, 1.0, -1.0])[:, None]

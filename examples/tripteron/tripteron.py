@@ -52,13 +52,13 @@ def two_points(p, q, qd, qdd, force):
 
 @workbench.forward_kinematics
 def forward(p, q):
-    """x = q: the robot is decoupled."""
+    """The robot is decoupled: x = q."""
     return q.copy()
 
 
 @workbench.inverse_kinematics
 def inverse(p, x):
-    """q = x."""
+    """The same the other way: q = x."""
     return x.copy()
 
 
