@@ -20,6 +20,7 @@ MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("__main__", "cli", "commands", "console"),
+    ("studio",),
     ("report", "compare", "rendering"),
     ("sweep", "diagnosis", "importing"),
     ("campaign", "workspace"),
