@@ -11,7 +11,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.campaign.spec import CaseSpec
 from workbench.capabilities.robot import Robot
-from workbench.errors import MotionError
+from workbench.errors import ModelError, MotionError
 
 NOT_DRIVEN = "not-driven"
 """Status of such a case."""
@@ -71,7 +71,7 @@ def with_nearest_joints(error: MotionError, robot: Robot, q: FloatArray) -> Moti
             robot.platform_motion(pose, still, still)
             robot.inverse_dynamics(pose, still, still)
             robot.reference.inverse_dynamics(pose, still, still)
-        except MotionError:
+        except (MotionError, ModelError):  # the latter of a robot that cannot be assembled at all
             return False
         return True
 

@@ -50,6 +50,9 @@ def diagnose(
     from workbench.diagnosis.surface import each_diagnosis, write_mended
     from workbench.sweep.files import write_bytes
 
+    for target in (json_, apply):
+        if target is not None and target.exists() and not target.is_file():
+            raise OutputError(f"{target}: is {'a directory' if target.is_dir() else 'no regular file'}; name a file")
     found: list[Diagnosis] = []
     for diagnosis in each_diagnosis(
         campaign,

@@ -21,6 +21,7 @@ import pyarrow.parquet as pq
 from workbench import reading
 from workbench.campaign import store
 from workbench.campaign.compare import Row
+from workbench.errors import OutputError
 from workbench.staging import DirectoryKind
 from workbench.sweep import journal as journal_file
 from workbench.sweep.journal import Journal
@@ -77,7 +78,15 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all."""
+    """Write a file whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        Something stands there that is no regular file: a device, a pipe; to replace it would take it from the system.
+    """
+    if path.exists() and not path.is_file():
+        raise OutputError(f"{path}: is {'a directory' if path.is_dir() else 'no regular file'}; name a file")
     temporary = path.with_name(f".{path.name}.part")
     try:
         temporary.write_bytes(content)
