@@ -62,7 +62,10 @@ def with_nearest_joints(error: MotionError, robot: Robot, q: FloatArray) -> Moti
     sample = error.facts.get("sample")
     if sample is None or "nearest" in error.facts or not np.isfinite(q[sample]).all():
         return error
-    home = robot.home
+    try:
+        home = robot.home
+    except ModelError:  # a robot that cannot be assembled at all has none
+        return error
 
     def driven(share: float) -> bool:
         pose = (home + share * (q[sample] - home))[None, :]
@@ -71,7 +74,7 @@ def with_nearest_joints(error: MotionError, robot: Robot, q: FloatArray) -> Moti
             robot.platform_motion(pose, still, still)
             robot.inverse_dynamics(pose, still, still)
             robot.reference.inverse_dynamics(pose, still, still)
-        except (MotionError, ModelError):  # the latter of a robot that cannot be assembled at all
+        except MotionError:
             return False
         return True
 
