@@ -44,6 +44,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "limits",
         "processes",
         "reading",
+        "parquet_columns",
         "records",
         "file_lock",
         "scratch",

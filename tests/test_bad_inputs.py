@@ -67,6 +67,7 @@ def faults(cases: Sequence[Bad], good: Path, root: Path) -> list[str]:
                 fault = f"leaves {left}"
             if fault:
                 found.append(f"{case.name}: {fault}")
+                print(f"\n{found[-1]}", flush=True)
             if isinstance(answer, Answer):
                 answers[case] = answer
             shutil.rmtree(root / str(number), ignore_errors=True)
@@ -113,7 +114,8 @@ def test_the_judge_sees_every_fault() -> None:
     assert fine.fault(bad) == ""
     for code, err, seconds, megabytes in (
         (0, line, 1.0, 100.0), (-9, line, 1.0, 100.0), (3, line, 1.0, 100.0),
-        (2, line + line, 1.0, 100.0), (2, "", 1.0, 100.0), (2, "workbench: other.toml\n", 1.0, 100.0), (2, line, 61.0, 100.0), (2, line, 1.0, 9000.0),
+        (2, line + line, 1.0, 100.0), (2, "", 1.0, 100.0),
+        (2, "workbench: other.toml\n", 1.0, 100.0), (2, line, 61.0, 100.0), (2, line, 1.0, 9000.0),
         (2, "Traceback (most recent call last)\n", 1.0, 100.0), (2, "workbench: bad.toml: " + "x" * 2000, 1.0, 100.0),
     ):  # fmt: skip
         assert Answer(code, "", err, seconds, megabytes).fault(bad)
