@@ -20,6 +20,7 @@ MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("__main__", "cli", "commands", "console"),
+    ("studio",),
     ("report", "compare", "rendering"),
     ("sweep", "diagnosis", "importing"),
     ("campaign", "workspace"),
@@ -45,6 +46,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "processes",
         "reading",
         "parquet_columns",
+        "output_file",
         "records",
         "file_lock",
         "scratch",

@@ -114,8 +114,8 @@ def test_the_judge_sees_every_fault() -> None:
     assert fine.fault(bad) == ""
     for code, err, seconds, megabytes in (
         (0, line, 1.0, 100.0), (-9, line, 1.0, 100.0), (3, line, 1.0, 100.0),
-        (2, line + line, 1.0, 100.0), (2, "", 1.0, 100.0),
-        (2, "workbench: other.toml\n", 1.0, 100.0), (2, line, 61.0, 100.0), (2, line, 1.0, 9000.0),
+        (2, line + line, 1.0, 100.0), (2, "", 1.0, 100.0), (2, "workbench: other.toml\n", 1.0, 100.0),
+        (2, line, 61.0, 100.0), (2, line, 1.0, 9000.0),
         (2, "Traceback (most recent call last)\n", 1.0, 100.0), (2, "workbench: bad.toml: " + "x" * 2000, 1.0, 100.0),
     ):  # fmt: skip
         assert Answer(code, "", err, seconds, megabytes).fault(bad)

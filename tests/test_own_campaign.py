@@ -44,7 +44,7 @@ def run(workbench: Workbench, code: str | None, campaign: str = CAMPAIGN, *optio
 
 def test_the_reference_alone(workbench: Workbench) -> None:
     done = workbench.run(CAMPAIGN, "--out", "out")
-    assert done.code == 0, done.err
+    assert done.code == 4, done.err  # nothing is judged
     found = wb.load_run("out")
     case = found.manifest.cases["turn"]
     assert case.mobility == 1
@@ -125,12 +125,12 @@ def test_a_slow_one_is_named_and_an_endless_one_stopped(workbench: Workbench, mo
     code = "import time\n@workbench.candidate\ndef slow(p, q, qd, qdd):\n    time.sleep(0.1)\n    return q\n"
     run(workbench, code)
     assert "is slow" in wb.load_run("out").manifest.cases["turn"].warnings[0]
-    monkeypatch.setattr(user_candidates, "LIMIT_S", 0.05)
+    monkeypatch.setattr(user_candidates, "LIMIT_S", 0.5)
     done = run(workbench, "@workbench.candidate\ndef endless(p, q, qd, qdd):\n    while True:\n        p.m1\n")
     message = wb.load_run("out").manifest.cases["turn"].message
     assert done.code == 1
     assert message is not None
-    assert "takes more than 0.05 s for 41 samples" in message
+    assert "takes more than 0.5 s for 41 samples" in message
     assert "mine.py:6" in message or "mine.py:7" in message
 
 
@@ -142,7 +142,7 @@ def test_a_formula_runs_only_when_the_command_line_names_its_file(workbench: Wor
     assert done.code == 2
     assert "--candidates FILE" in done.err
     assert not Path("ran").exists()
-    assert run(workbench, code, campaign).code == 0
+    assert run(workbench, code, campaign).code == 4
     assert Path("ran").exists()
 
 

@@ -1,7 +1,7 @@
 """The command line: parse, call, print.
 
-Exit code 0: every bound holds; 1: a bound fails; 2: bad input; 3: a fault of the workbench itself; 130: interrupted;
-143, 129: ended by SIGTERM, SIGHUP.
+Exit code 0: every bound holds; 1: a bound fails; 2: bad input; 3: a fault of the workbench itself; 4: nothing was held
+against a bound; 130: interrupted; 143, 129: ended by SIGTERM, SIGHUP.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from workbench.commands.new import new
 from workbench.commands.report import report
 from workbench.commands.run import run
 from workbench.commands.status import status
+from workbench.commands.studio import studio
 from workbench.commands.watch import watch
 from workbench.commands.workspace import workspace
 from workbench.errors import WorkbenchError
@@ -83,6 +84,7 @@ app.add_typer(model)
 app.command()(compare)
 app.command()(diagnose)
 app.command()(watch)
+app.command()(studio)
 
 
 def main() -> NoReturn:

@@ -144,7 +144,9 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     for joint, force in first.reactions.items():
         series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
     series["closure_residual"] = first.closure_residual
-    facts = _facts(case, reference, first, rows, platform) | {"evidence": evidence.facts()}
+    facts = _facts(case, first, rows, platform) | {"evidence": evidence.facts()}
+    if effort.described:
+        facts |= _description(case, reference, first)
     if recorded:
         facts["recorded"] = {found.spec.label: found.facts for found in recorded}
     facts["warnings"] = [*facts["warnings"], *hints, *left]
@@ -223,6 +225,8 @@ def _rows(
 ) -> list[Row]:
     rows = []
     reaction = largest_reaction(reference.reactions.values())
+    known = case.robot.candidates.get(candidate.name)
+    mass_model = known.mass_model if known else candidate.reference
     for i, joint in enumerate(case.robot.joints):
         error = joint_error(tau[:, i], reference.tau[:, i], reaction)
         uncertainty = evidence.uncertainty(candidate.reference, joint)
@@ -239,7 +243,7 @@ def _rows(
                 worst_time_s=float(case.motion.t[error.worst_index]),
                 bound=judged.bound,
                 verdict=verdict_of(judged, case.name, joint, error.peak_error, uncertainty),
-                kind=kind_of(candidate),
+                kind=kind_of(candidate, mass_model),
                 unit=case.robot.force_units[i],
                 peak_reference=error.peak_reference,
                 pointwise_skipped=error.pointwise_skipped,
@@ -308,11 +312,9 @@ def _motion_columns(case: Case) -> dict[str, FloatArray]:
     return columns
 
 
-def _facts(
-    case: Case, reference: MujocoReference, result: ReferenceResult, rows: list[Row], platform: Platform
-) -> dict[str, Any]:
+def _facts(case: Case, result: ReferenceResult, rows: list[Row], platform: Platform) -> dict[str, Any]:
+    """What is judged of a case, and figures that a sweep stores."""
     t = case.motion.t
-    mobility = reference.mobility()
     speed = np.linalg.norm(result.xd, axis=1)
     acceleration = np.linalg.norm(result.xdd, axis=1)
     measures = case.robot.singularity_measures(case.motion.q)
@@ -328,19 +330,8 @@ def _facts(
     failed = bool(apart) or any(row.verdict in FAILURES for row in rows)
     return {
         "status": "failed" if failed else "passed",
-        "title": case.spec.title,
-        "description": case.spec.description,
         "message": message,
         "samples": len(t),
-        "duration_s": float(t[-1] - t[0]),
-        "parameters": case.overrides,
-        "external_force": list(case.spec.external_force),
-        "mobility": mobility.mobility,
-        "joint_freedoms": mobility.joint_freedoms,
-        "rank": mobility.rank,
-        "constraint_rows": mobility.constraint_rows,
-        "redundant_rows": mobility.redundant_rows,
-        "idle_freedoms": mobility.idle_freedoms,
         "closure_residual": float(result.closure_residual.max()),
         "velocity_residual": float(result.velocity_residual.max()),
         "acceleration_residual": float(result.acceleration_residual.max()),
@@ -354,11 +345,29 @@ def _facts(
             for name, v in measures.items()
         },
         "kinematics": kinematics,
+        "warnings": [
+            *case.motion.warnings,
+            *case.robot.warnings(case.motion.t, case.motion.q, case.motion.qd, measures),
+        ],
+    }
+
+
+def _description(case: Case, reference: MujocoReference, result: ReferenceResult) -> dict[str, Any]:
+    """What a manifest says of a case beyond that."""
+    t, mobility = case.motion.t, reference.mobility()
+    return {
+        "title": case.spec.title,
+        "description": case.spec.description,
+        "duration_s": float(t[-1] - t[0]),
+        "parameters": case.overrides,
+        "external_force": list(case.spec.external_force),
+        "mobility": mobility.mobility,
+        "joint_freedoms": mobility.joint_freedoms,
+        "rank": mobility.rank,
+        "constraint_rows": mobility.constraint_rows,
+        "redundant_rows": mobility.redundant_rows,
+        "idle_freedoms": mobility.idle_freedoms,
         "conditions": [dataclasses.asdict(c) for c in case.robot.conditions(case.motion.q)],
         "solutions_at_start": case.robot.assembly_solutions(case.motion.q[:1])[0].tolist(),
         "peak_reactions": {name: float(np.linalg.norm(f, axis=1).max()) for name, f in result.reactions.items()},
-        "warnings": [
-            *case.motion.warnings,
-            *case.robot.warnings(case.motion.t, case.motion.q, case.motion.qd),
-        ],
     }

@@ -39,6 +39,8 @@ class Effort:
     """the robot's points over time, for drawings of it"""
     timed: bool = True
     """a slow formula is warned of; not where warnings are stored as numbers, which must not depend on the clock"""
+    described: bool = True
+    """all that a manifest says of a case; without it, what is judged and the figures that a sweep stores"""
 
 
 FULL = Effort()

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from workbench.arrays import FloatArray
+from workbench.arrays import FloatArray, as_batch
 from workbench.errors import MotionError
-from workbench.robots.closed_form import Reach
+
+if TYPE_CHECKING:
+    from workbench.capabilities.robot import Robot
 
 STEPS = 200
 """Poses on the straight way from home that are looked at first, so that no gap in it is stepped over ..."""
@@ -17,20 +19,19 @@ HALVINGS = 40
 """... before the last part is halved."""
 
 
-def with_nearest(
-    error: MotionError, x: FloatArray, home: FloatArray, reach: Callable[[FloatArray], Reach]
-) -> MotionError:
-    """Return *error* with the last pose that is in reach on the straight way from the home pose to the sample's.
+def with_nearest(error: MotionError, robot: Robot, at: ArrayLike) -> MotionError:
+    """Return *error* with the last pose in reach on the straight way from the home pose to the one that it refuses.
 
-    *x* is ``(n, m)``, *home* ``(m,)``, both in task coordinates. An error that names no sample, and one of
-    a pose that can be reached (a singular one), stay as they are.
+    *at* are the poses ``(n, m)`` in task coordinates. An error that names no sample, and one of a pose that can be
+    reached (a singular one), stay as they are.
     """
-    sample = error.facts.get("sample")
+    sample, x = error.facts.get("sample"), as_batch("x", at)
     if sample is None or not np.isfinite(x[sample]).all():
         return error
+    home = robot.forward_kinematics(robot.home[None, :])[0]
 
     def reached(shares: FloatArray) -> NDArray[np.bool_]:
-        return reach(home + shares[:, None] * (x[sample] - home)).reachable
+        return robot.reach(home + shares[:, None] * (x[sample] - home)).reachable
 
     shares = np.linspace(0.0, 1.0, STEPS + 1)
     seen = reached(shares)

@@ -14,6 +14,7 @@ from workbench.arrays import FloatArray, as_batch
 from workbench.capabilities.identity import RobotIdentity
 from workbench.capabilities.limits import reach_box
 from workbench.capabilities.nearest import with_nearest
+from workbench.capabilities.offered import OfferedCandidates
 from workbench.capabilities.samples import one_or_many
 from workbench.capabilities.warnings import (
     millimetre_warnings,
@@ -86,6 +87,11 @@ class Robot(RobotIdentity):
         """The parameters by name, SI."""
         return dict(self._values)
 
+    @property
+    def file_values(self) -> Mapping[str, float]:
+        """The parameters as the model's file has them, before any change, SI."""
+        return dict(self._base.loaded.values or {})
+
     def with_parameters(self, **changes: float) -> Robot:
         """Return a new robot with some parameters changed.
 
@@ -148,7 +154,7 @@ class Robot(RobotIdentity):
     def candidates(self) -> Mapping[str, Candidate]:
         """Formulas by name, a user's included where they were offered."""
         own: Mapping[str, Candidate] = self._kind.candidates if self._kind else {}
-        return own if self._extra is None else _Offered(self._extra, own)  # type: ignore[arg-type]
+        return own if self._extra is None else OfferedCandidates(self._extra, own)  # type: ignore[arg-type]
 
     def offer(self, candidates: Mapping[str, Candidate]) -> None:
         """Add candidates to those of this robot, and of robots made from it."""
@@ -216,7 +222,7 @@ class Robot(RobotIdentity):
         try:
             found: FloatArray = own(x, *branch, **named)
         except MotionError as error:
-            raise (error if branch or named else self._out_of_reach(error, x)) from None
+            raise (error if branch or named else with_nearest(error, self, x)) from None
         return found
 
     @one_or_many(3)
@@ -228,16 +234,8 @@ class Robot(RobotIdentity):
         try:
             found: tuple[FloatArray, FloatArray, FloatArray] = own(x, xd, xdd)
         except MotionError as error:
-            raise self._out_of_reach(error, x) from None
+            raise with_nearest(error, self, x) from None
         return found
-
-    def _out_of_reach(self, error: MotionError, x: ArrayLike) -> MotionError:
-        """The same error with the last pose in reach on the way to the one that it refuses, where that is known."""
-        reach = self._own("reach")
-        if not reach:
-            return error
-        home = self.forward_kinematics(self.home[None, :])[0]
-        return with_nearest(error, as_batch("x", x), home, reach)
 
     def reach(self, x: ArrayLike) -> Reach:
         """Inverse kinematics that marks poses out of reach instead of refusing them; x ``(n, m)``."""
@@ -369,27 +367,28 @@ class Robot(RobotIdentity):
 
     # what a reader should know
 
-    def warnings(self, t: FloatArray, q: FloatArray, qd: FloatArray | None = None) -> list[str]:
+    def warnings(
+        self,
+        t: FloatArray,
+        q: FloatArray,
+        qd: FloatArray | None = None,
+        measures: Mapping[str, FloatArray] | None = None,
+    ) -> list[str]:
         """What a reader of a case's results should know: poses near a singularity, friction at rest, millimetres.
 
         Parameters
         ----------
         t, q, qd
             Times ``(n,)`` in seconds, actuated coordinates and, where friction matters, their rates ``(n, na)``.
+        measures
+            What `singularity_measures` gives at *q*, where it is at hand.
         """
         found = [] if qd is None or self.closed_form is None else self.closed_form.friction_warnings(qd)
         if self.closed_form is None:
             found += reference_warnings(self, qd)
-        return [*found, *near_singular_warnings(self, t, q), *self.millimetre_warnings()]
+        near = self.singularity_measures(q) if measures is None else measures
+        return [*found, *near_singular_warnings(t, near), *self.millimetre_warnings()]
 
     def millimetre_warnings(self) -> list[str]:
         """Lengths that were most likely written in millimetres."""
         return millimetre_warnings(self._description.table, self._values)
-
-
-class _Offered(ChainMap[str, Candidate]):
-    """A user's candidates before a robot's own; keeps the list of those that are wrong on purpose."""
-
-    @property
-    def on_purpose(self) -> Any:
-        return getattr(self.maps[1], "on_purpose", ())

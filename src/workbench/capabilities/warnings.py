@@ -26,10 +26,10 @@ DEGREES = 4.0 * np.pi
 """A hinge that moves through more than two turns was most likely given in degrees."""
 
 
-def near_singular_warnings(robot: Robot, t: FloatArray, q: FloatArray) -> list[str]:
-    """Poses of a motion that come close to a singular one."""
+def near_singular_warnings(t: FloatArray, measures: Mapping[str, FloatArray]) -> list[str]:
+    """Poses of a motion that come close to a singular one, by `Robot.singularity_measures`."""
     found = []
-    for name, values in robot.singularity_measures(q).items():
+    for name, values in measures.items():
         worst = int(np.argmin(np.abs(values)))
         if abs(values[worst]) < NEAR_SINGULAR:
             found.append(

@@ -219,7 +219,9 @@ def new(
     ] = None,
     language: Annotated[
         str | None,
-        typer.Option(metavar="octave|c|julia|program", help="The formula in this language too. Default: Python alone."),
+        typer.Option(
+            metavar="octave|c|julia|r|program", help="The formula in this language too. Default: Python alone."
+        ),
     ] = None,
     source: Annotated[
         Path | None,

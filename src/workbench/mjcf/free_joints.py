@@ -65,22 +65,23 @@ class FreeJoints:
 
 
 def user_qpos(model: mujoco.MjModel, prepared: mujoco.MjModel, free: FreeJoints, qpos: FloatArray) -> FloatArray:
-    """The user's coordinates ``(nq,)`` at those of the prepared model; bodies that stand still are where drawn."""
-    found = np.array(model.qpos0)
+    """The user's coordinates ``(n, nq)`` at those of the prepared model; bodies that stand still are where drawn."""
+    found: FloatArray = np.tile(model.qpos0, (len(qpos), 1))
     new = 0
     for joint in range(model.njnt):
         if joint in free.fixed:
             continue
-        at, here = int(model.jnt_qposadr[joint]), qpos[prepared.jnt_qposadr[new] :]
+        at, here = int(model.jnt_qposadr[joint]), qpos[:, prepared.jnt_qposadr[new] :]
         if any(split.joint == joint for split in free.split):
-            whole = np.zeros(4)
-            mujoco.mju_mulQuat(whole, model.qpos0[at + 3 : at + 7], here[3:7])
-            found[at : at + 3] += here[:3]
-            found[at + 3 : at + 7] = whole
+            whole, drawn = np.zeros(4), np.array(model.qpos0[at + 3 : at + 7])
+            found[:, at : at + 3] += here[:, :3]
+            for sample, turn in enumerate(here[:, 3:7]):
+                mujoco.mju_mulQuat(whole, drawn, turn)
+                found[sample, at + 3 : at + 7] = whole
             new += 4
             continue
         size = {mujoco.mjtJoint.mjJNT_BALL: 4, FREE: 7}.get(mujoco.mjtJoint(model.jnt_type[joint]), 1)
-        found[at : at + size] = here[:size]
+        found[:, at : at + size] = here[:, :size]
         new += 1
     return found
 

@@ -175,7 +175,7 @@ class _Check:
         """The same state of both models, and the user's velocities per velocity of the prepared one."""
         user, prepared = self.user, self.prepared
         mujoco.mj_normalizeQuat(prepared, qpos)
-        theirs = user_qpos(user, prepared, self.plan.free, qpos)
+        theirs = user_qpos(user, prepared, self.plan.free, qpos[None])[0]
         turn = np.zeros((user.nv, prepared.nv))
         for old, new in zip(self.kept, self.same, strict=True):
             c, d = int(user.jnt_dofadr[old]), int(prepared.jnt_dofadr[new])

@@ -34,6 +34,22 @@ STILL = 1e-6
 class OrderedClosure(Continuation):
     """Adds to a continuation from home the closure along a motion, and from given configurations."""
 
+    _kept: tuple[FloatArray, Assembly] | None = None
+    """what was scattered last: a motion's samples are asked for in order and one by one"""
+
+    def close(self, q: FloatArray) -> Assembly:
+        """Close the loops for actuated coordinates ``(n, na)``, SI, any order of samples; not to be written into.
+
+        Raises
+        ------
+        MotionError
+            Naming the first sample that cannot be reached on the home branch, its coordinates and the open loop.
+        """
+        if self._kept is None or not np.array_equal(self._kept[0], q):
+            self._kept = None  # not two of them in memory at a time
+            self._kept = (q.copy(), self.follow(q))
+        return self._kept[1]
+
     def close_along(self, q: FloatArray) -> Assembly:
         """Close actuated coordinates ``(n, na)`` that are a motion, in order; the first is reached from home.
 
@@ -43,7 +59,7 @@ class OrderedClosure(Continuation):
             Naming the first sample that cannot be reached from its predecessor (the first of all: from home).
         """
         try:
-            found = self.follow(q)
+            found = self.close(q)
         except MotionError:
             # out of the reach of straight lines from home, but perhaps not of the motion
             found = self._nothing(len(q), q.shape[1])
@@ -51,6 +67,9 @@ class OrderedClosure(Continuation):
             missing = np.arange(len(q) - 1)
         else:
             missing = np.flatnonzero(~self._linked(found, q))
+            if not len(missing):
+                return found
+            found = found.at(np.arange(len(q)))
         step, here = self._nothing(len(q), q.shape[1]), -1
         for link in missing:
             here = max(here, int(link))

@@ -87,16 +87,6 @@ class LoopCloser(OrderedClosure):
         """The pose from which all others are reached, and what is known of it."""
         return self._home
 
-    def close(self, q: FloatArray) -> Assembly:
-        """Close the loops for actuated coordinates ``(n, na)``, SI, any order of samples.
-
-        Raises
-        ------
-        MotionError
-            Naming the first sample that cannot be reached on the home branch, its coordinates and the open loop.
-        """
-        return self.follow(q)
-
     def jacobian(self, qpos: FloatArray) -> FloatArray:
         """Constraint Jacobian ``(m, nv)`` of one configuration ``(nq,)``."""
         return constraint_jacobian(self.engine, self.structure, self.joints, qpos[None, :])[0]

@@ -54,7 +54,7 @@ def look(reference: MujocoReference, result: ReferenceResult) -> LeftOut:
     if prepared is None or prepared.preparation is None:
         return LeftOut((), ())
     user, free = prepared.user, prepared.preparation.free
-    poses = np.array([user_qpos(user, prepared.model, free, row) for row in result.qpos])
+    poses = user_qpos(user, prepared.model, free, result.qpos)
     limited, outside = _limits(user, poses)
     notes = []
     if limited:
@@ -116,7 +116,9 @@ def _home(reference: MujocoReference, user: mujoco.MjModel) -> FloatArray:
     prepared = reference.loaded.prepared
     assert prepared is not None
     assert prepared.preparation is not None
-    return user_qpos(user, prepared.model, prepared.preparation.free, reference.structure.home_qpos)
+    home = reference.structure.home_qpos[None]
+    drawn: FloatArray = user_qpos(user, prepared.model, prepared.preparation.free, home)[0]
+    return drawn
 
 
 def _disabled(model: mujoco.MjModel, flag: str) -> bool:

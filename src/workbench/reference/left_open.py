@@ -50,13 +50,12 @@ def left_open(
 def _with_round_rods(reference: MujocoReference) -> mujoco.MjModel | None:
     """The model with every lopsided rod made round about its axis; None where there is none."""
     model, structure = reference.compiled(), reference.structure
+    shapes = [(rod, RodFrame(model, rod, structure.frames)) for rod in structure.rods]
+    uneven = [(rod, shape) for rod, shape in shapes if shape.unevenness().beyond(ROUND)]
+    if not uneven:
+        return None
     spec = reference.spec()
-    changed = False
-    for rod in structure.rods:
-        shape = RodFrame(model, rod, structure.frames)
-        if not shape.unevenness().beyond(ROUND):
-            continue
-        changed = True
+    for rod, shape in uneven:
         place, inertia = shape.rounded()
         body = spec.bodies[rod.body]
         body.explicitinertial = True
@@ -64,8 +63,6 @@ def _with_round_rods(reference: MujocoReference) -> mujoco.MjModel | None:
         body.ipos, body.iquat = place, [1.0, 0.0, 0.0, 0.0]
         body.inertia = [0.0, 0.0, 0.0]
         body.fullinertia = [inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    if not changed:
-        return None
     # the first body of a rod of several takes all of the difference, and need not be a possible one by itself
     spec.compiler.balanceinertia = False
     try:

@@ -106,6 +106,21 @@ class Structure:
 
 def refusals_of(model: mujoco.MjModel) -> list[Refusal]:
     """Everything for which no right torque can be given, without raising; empty where the model can be read."""
+    return _read(model).refusals
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What is read of a model before anything is refused."""
+
+    closures: Closures
+    base: int
+    site: int
+    judged: list[tuple[Rod, Refusal | None, str]]
+    refusals: list[Refusal]
+
+
+def _read(model: mujoco.MjModel) -> _Found:
     closures = read_closures(model)
     found = uncovered(model, closures)
     if not model.nu:
@@ -118,9 +133,10 @@ def refusals_of(model: mujoco.MjModel) -> list[Refusal]:
                 "no actuator",
             )
         )
-    _, missing = _named(model, mujoco.mjtObj.mjOBJ_BODY, "base_body", "body")
+    base, missing = _named(model, mujoco.mjtObj.mjOBJ_BODY, "base_body", "body")
     site, lost = _named(model, mujoco.mjtObj.mjOBJ_SITE, "platform_site", "site")
-    return found + missing + lost + [r for _, r, _ in _judged(model, closures, site) if r is not None]
+    judged = _judged(model, closures, site)
+    return _Found(closures, base, site, judged, found + missing + lost + [r for _, r, _ in judged if r is not None])
 
 
 def structure_of(loaded: LoadedModel) -> Structure:
@@ -146,9 +162,9 @@ def read_structure(model: mujoco.MjModel, file: str) -> Structure:
         Something the projection does not cover (contacts, limits, spatial tendons' equalities ...). The message joins
         all of it; ``error.facts["refusals"]`` holds one `Refusal` each.
     """
-    refused = refusals_of(model)
-    if refused:
-        raise joined(file, refused)
+    found = _read(model)
+    if found.refusals:
+        raise joined(file, found.refusals)
     obj = mujoco.mjtObj
     joints = [int(model.actuator_trnid[a, 0]) for a in range(model.nu)]
     actuated = np.array([model.jnt_dofadr[j] for j in joints], dtype=np.int64)
@@ -158,9 +174,7 @@ def read_structure(model: mujoco.MjModel, file: str) -> Structure:
         first = model.body_dofadr[body]
         if first >= 0:
             moves[body, first : first + model.body_dofnum[body]] = True
-    closures = read_closures(model)
-    site = _named(model, obj.mjOBJ_SITE, "platform_site", "site")[0]
-    judged = _judged(model, closures, site)
+    closures, site, judged = found.closures, found.site, found.judged
     rods = tuple(rod for rod, _, _ in judged)
     blocks = [*closures.blocks, *(spin_block(rod) for rod in rods)]
     idle = tuple(name_of(model, obj.mjOBJ_BODY, rod.body) for rod in rods)
@@ -182,7 +196,7 @@ def read_structure(model: mujoco.MjModel, file: str) -> Structure:
         polynomials=np.array([*closures.polynomials, *(np.zeros(5) for _ in rods)], dtype=np.float64).reshape(-1, 5),
         moves=moves,
         root=np.array(model.body_rootid, dtype=np.int64),
-        base=_named(model, obj.mjOBJ_BODY, "base_body", "body")[0],
+        base=found.base,
         platform_site=site,
         idle=idle,
         home_qpos=np.array(model.key_qpos[home] if home >= 0 else model.qpos0, dtype=np.float64),

@@ -12,12 +12,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.errors import OutputError, ParameterError
+from workbench.output_file import refuse_target
 from workbench.robots.assignments import parse_assignment, resolve_changes
 from workbench.robots.catalogue import find_source
 from workbench.robots.inertia import refuse_impossible_bodies
 from workbench.robots.load import LoadedModel, load_edited, no_parameters, read_base, refuse_computed
 from workbench.robots.values import rewrite
 
+MANY = 10.0
+"""Lengths and masses that change by such a factor are warned of."""
+MEANT = "; lengths are in metres"
 COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
 NUMBER = re.compile(r"(?<![\w.-])\d+\.?\d*(?:[eE][-+]?\d+)?(?!\w)")
 MILLIMETRES = 1000.0
@@ -45,6 +49,16 @@ class EditResult:
     """numbers of the lines that changed, from 1"""
     stale: tuple[int, ...] = ()
     """lines of comments that name a number as it was before"""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Lengths and masses that became many times larger or smaller, each with its factor."""
+        return tuple(
+            f"{change.name} = {change.after:g} {change.unit} is {_times(change)} what it was ({change.before:g}"
+            f" {change.unit}){MEANT if change.unit == 'm' else ''}"
+            for change in self.changes
+            if change.unit in ("m", "kg") and change.before and not 1 / MANY < change.after / change.before < MANY
+        )
 
 
 def resolve_for(path: str | Path, changes: Sequence[str]) -> dict[str, float]:
@@ -115,7 +129,7 @@ def edit_file(
     if (in_place and found.robot is not None and found.robot.builtin) or (in_place and str(source) != found.shown):
         raise OutputError(f"{path} comes with the workbench and is not changed in place; write to another file")
     target = source if out is None else Path(out)
-    _refuse_target(target)
+    refuse_target(target)
     base = read_base(path)
     loaded, values = base.loaded, base.loaded.values
     if loaded.description is None or values is None:
@@ -135,7 +149,14 @@ def edit_file(
         for name, info in described.table.infos.items()
         if after[name] != values[name]
     )
-    return EditResult(source, target, moved, changed_lines(loaded.text, text), tuple(_stale(text, moved)))
+    return EditResult(
+        source, target, moved, changed_lines(loaded.text, text), tuple(dict.fromkeys(_stale(text, moved)))
+    )
+
+
+def _times(change: Change) -> str:
+    factor = change.after / change.before
+    return f"{factor:.4g} times" if abs(factor) >= 1 or not factor else f"1/{1 / factor:.4g} of"
 
 
 def _stale(text: str, moved: Sequence[Change]) -> Iterator[int]:
@@ -143,44 +164,19 @@ def _stale(text: str, moved: Sequence[Change]) -> Iterator[int]:
     old = {size * change.before for change in moved for size in (1.0, MILLIMETRES if change.unit == "m" else 1.0)}
     for comment in COMMENT.finditer(text):
         for number in NUMBER.finditer(text, comment.start(1), comment.end(1)):
-            if float(number.group()) in old and len(number.group().strip("0.")) > 1:
+            if float(number.group()) in old and _tells(number.group()):
                 yield text.count("\n", 0, number.start()) + 1
+
+
+def _tells(number: str) -> bool:
+    """Whether a number in a comment is more than a counter: a fraction, or two digits and more."""
+    return "." in number or len(number.strip("0")) > 1 or len(number) > 2
 
 
 def changed_lines(before: str, after: str) -> tuple[int, ...]:
     """Numbers, from 1, of the lines in which two versions of a model differ; an edit keeps the number of lines."""
     pairs = zip(before.split("\n"), after.split("\n"), strict=True)
     return tuple(index for index, (old, new) in enumerate(pairs, start=1) if old != new)
-
-
-def _refuse_target(target: Path) -> None:
-    try:
-        mode = os.lstat(target).st_mode
-    except FileNotFoundError:
-        if not target.parent.is_dir():
-            raise OutputError(f"{target}: there is no directory {target.parent}") from None
-        return
-    except (OSError, ValueError) as error:
-        raise OutputError(f"{str(target)!r}: {getattr(error, 'strerror', None) or error}") from error
-    if stat.S_ISLNK(mode):
-        raise OutputError(f"{target}: is a symbolic link; name the file that it leads to")
-    if not stat.S_ISREG(mode):
-        raise OutputError(f"{target}: is {'a directory' if stat.S_ISDIR(mode) else 'no regular file'}; name a file")
-    _refuse_protected(target)
-
-
-def _refuse_protected(target: Path) -> None:
-    """Refuse a file that its owner has protected, or that has a second name which would keep the old content."""
-    try:
-        status = os.lstat(target)
-    except OSError:
-        return
-    if not status.st_mode & stat.S_IWUSR or not os.access(target, os.W_OK):
-        raise OutputError(f"{target}: is read-only; make it writable or name another file")
-    if status.st_nlink > 1:
-        raise OutputError(
-            f"{target}: has {status.st_nlink} names (hard links), of which one would change; name another file"
-        )
 
 
 def _write(target: Path, text: str, source: Path) -> None:

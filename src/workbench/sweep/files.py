@@ -82,6 +82,8 @@ def write_bytes(path: Path, content: bytes) -> None:
     try:
         temporary.write_bytes(content)
         os.replace(temporary, path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error  # not the name in between
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
