@@ -45,6 +45,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "limits",
         "processes",
         "reading",
+        "parquet_columns",
+        "output_file",
         "records",
         "file_lock",
         "scratch",

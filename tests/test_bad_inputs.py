@@ -67,6 +67,7 @@ def faults(cases: Sequence[Bad], good: Path, root: Path) -> list[str]:
                 fault = f"leaves {left}"
             if fault:
                 found.append(f"{case.name}: {fault}")
+                print(f"\n{found[-1]}", flush=True)
             if isinstance(answer, Answer):
                 answers[case] = answer
             shutil.rmtree(root / str(number), ignore_errors=True)

@@ -21,7 +21,7 @@ from workbench.errors import SpecError
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 ASYM = "models/asym_2rss_ppap.xml"
-PATIENCE = 60.0
+PATIENCE = 300.0
 """Seconds for one pass on a busy machine."""
 
 

@@ -90,7 +90,8 @@ class _Bar:
 
     def __enter__(self) -> Self:
         """Start the bar."""
-        self._bar.start()
+        if err.is_terminal:
+            self._bar.start()
         self._task = self._bar.add_task(self._what, total=None)
         return self
 
@@ -98,7 +99,8 @@ class _Bar:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Take the bar away."""
-        self._bar.stop()
+        if err.is_terminal:  # some versions of rich end with an empty line elsewhere
+            self._bar.stop()
 
 
 class CaseProgress(_Bar):

@@ -68,7 +68,8 @@ class SweepProgress:
 
     def __enter__(self) -> Self:
         """Start the bar."""
-        self._bar.start()
+        if err.is_terminal:
+            self._bar.start()
         self._task = self._bar.add_task("cases", total=None, note="")
         return self
 
@@ -76,7 +77,8 @@ class SweepProgress:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Take the bar away."""
-        self._bar.stop()
+        if err.is_terminal:  # some versions of rich end with an empty line elsewhere
+            self._bar.stop()
 
     def __call__(self, found: Snapshot) -> None:
         """Show where the sweep stands."""

@@ -95,6 +95,9 @@ def build_report(
     if wanted and manifest.sweep is not None:
         raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; a sweep's data are Parquet")
     files |= data_files(run_dir, wanted) if wanted else {}
+    for place in {path.parent for path in files} - {run_dir}:
+        if place.is_symlink():
+            raise OutputError(f"{place}: is a symbolic link; a report is written into its run directory alone")
     try:
         for path, content in files.items():
             path.parent.mkdir(exist_ok=True)
@@ -235,6 +238,8 @@ def _write(path: Path, content: bytes) -> None:
     try:
         temporary.write_bytes(content)
         os.replace(temporary, path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error  # not the name in between
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)

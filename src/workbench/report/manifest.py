@@ -346,10 +346,10 @@ class Manifest(Record):
     spec_file: str = ""
     spec: dict[str, Any] = Field(default_factory=dict)
     model: ModelRecord
-    joints: tuple[str, ...]
+    joints: tuple[str, ...] = Field(max_length=1000)
     coordinate_units: tuple[str, ...]
     force_units: tuple[str, ...]
-    platform_axes: tuple[str, ...] = ("x1", "x2", "x3")
+    platform_axes: tuple[str, ...] = Field(("x1", "x2", "x3"), max_length=6)
     mobility_count: dict[str, int] = Field(default_factory=dict)
     parameters: tuple[ParameterRecord, ...] = ()
     changes: ChangesRecord = ChangesRecord()

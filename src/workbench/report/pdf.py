@@ -18,9 +18,12 @@ import matplotlib as mpl
 import typst
 from PIL import Image
 
+from workbench.errors import OutputError
+from workbench.records import reason
 from workbench.report.case_section import CaseView
 from workbench.report.cost import cost_table
 from workbench.report.load import Run
+from workbench.report.pictures import MOST_PIXELS
 from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.style import PAPERS
@@ -98,12 +101,17 @@ def _drawing(plot: Plot, style: str) -> str:
     return standalone(plot.svg, plot.alt).replace("font-family: sans-serif", f"font-family: {FONTS[style]}")
 
 
-def _picture(content: bytes) -> str:
+def _picture(content: bytes, file: str) -> str:
     """A picture of pixels as SVG: Typst takes sources in memory as text alone."""
-    with Image.open(io.BytesIO(content)) as image:
-        width, height = image.size
-        buffer = io.BytesIO()
-        image.convert("RGB").save(buffer, format="png")
+    buffer = io.BytesIO()
+    try:
+        with Image.open(io.BytesIO(content), formats=["WEBP"]) as image:
+            width, height = image.size
+            if max(width, height) > MOST_PIXELS:
+                raise OutputError(f"{file}: {width} x {height} pixels; allowed: {MOST_PIXELS} along each edge")
+            image.convert("RGB").save(buffer, format="png")
+    except (OSError, ValueError, SyntaxError) as error:
+        raise OutputError(f"{file}: no WebP picture that can be read ({reason(error)})") from error
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
     size = f'width="{width}" height="{height}"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size}><image {size} href="data:image/png;base64,{data}"/></svg>'
@@ -165,7 +173,7 @@ def _case(view: CaseView, style: str, parts: dict[str, str]) -> Iterator[Block]:
     yield from _plots(view.plots, style, parts, {})
     if view.film is not None and view.film.still:
         name = f"{view.anchor}-still.svg"
-        parts[name] = _picture(view.film.still)
+        parts[name] = _picture(view.film.still, view.film.still_file)
         caption = "The robot's model as MuJoCo renders it, at the first moment of this case"
         yield {"kind": "plots", "plots": [_figure(name, caption, view.film.alt)], "wide": False}
     yield from map(_table, view.tables)

@@ -78,19 +78,13 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        Something stands there that is no regular file: a device, a pipe; to replace it would take it from the system.
-    """
-    if path.exists() and not path.is_file():
-        raise OutputError(f"{path}: is {'a directory' if path.is_dir() else 'no regular file'}; name a file")
+    """Write a file whole or not at all; what a user names is judged before, by `output_file.refuse_target`."""
     temporary = path.with_name(f".{path.name}.part")
     try:
         temporary.write_bytes(content)
         os.replace(temporary, path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error  # not the name in between
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
