@@ -21,7 +21,6 @@ import pyarrow.parquet as pq
 from workbench import reading
 from workbench.campaign import store
 from workbench.campaign.compare import Row
-from workbench.errors import OutputError
 from workbench.staging import DirectoryKind
 from workbench.sweep import journal as journal_file
 from workbench.sweep.journal import Journal
