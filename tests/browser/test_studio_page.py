@@ -24,7 +24,8 @@ from workbench.studio.life import serve
 from workbench.studio.session import Session
 from workbench.studio.subject import open_subject
 
-pytestmark = pytest.mark.browser
+# By hand until they have been seen to pass in a calm minute: on a busy machine a page took longer than four minutes.
+pytestmark = pytest.mark.long
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 DELTA = REPOSITORY / "examples" / "delta"
