@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -248,6 +251,14 @@ def test_the_command_line_says_and_counts_findings(repository: Path, tmp_path: P
     assert done.code == 1
     assert "ma: x 2 in weight" in " ".join(done.out.split())
     data = json.loads((tmp_path / "found.json").read_text())
+    os.mkfifo(tmp_path / "pipe")  # a device or a pipe is not replaced: as root this took /dev/null from the system
+    for option in ("--json", "--apply"):
+        done = subprocess.run(
+            [sys.executable, "-m", "workbench.cli", "diagnose", campaign, "--candidates", path, option, "pipe"],
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert (done.returncode, "pipe: is no regular file; name a file" in done.stderr) == (2, True), done
+    assert (tmp_path / "pipe").is_fifo()
     assert data["format"] == 1
     assert data["diagnoses"][0]["findings"][0]["parameters"] == ["ma"]
     right = repository / "examples" / "delta" / "delta.py"

@@ -11,7 +11,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.campaign.spec import CaseSpec
 from workbench.capabilities.robot import Robot
-from workbench.errors import MotionError
+from workbench.errors import ModelError, MotionError
 
 NOT_DRIVEN = "not-driven"
 """Status of such a case."""
@@ -62,7 +62,10 @@ def with_nearest_joints(error: MotionError, robot: Robot, q: FloatArray) -> Moti
     sample = error.facts.get("sample")
     if sample is None or "nearest" in error.facts or not np.isfinite(q[sample]).all():
         return error
-    home = robot.home
+    try:
+        home = robot.home
+    except ModelError:  # a robot that cannot be assembled at all has none
+        return error
 
     def driven(share: float) -> bool:
         pose = (home + share * (q[sample] - home))[None, :]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from workbench.arrays import FloatArray, as_batch
-from workbench.errors import MotionError
+from workbench.errors import ModelError, MotionError
 
 if TYPE_CHECKING:
     from workbench.capabilities.robot import Robot
@@ -28,7 +28,10 @@ def with_nearest(error: MotionError, robot: Robot, at: ArrayLike) -> MotionError
     sample, x = error.facts.get("sample"), as_batch("x", at)
     if sample is None or not np.isfinite(x[sample]).all():
         return error
-    home = robot.forward_kinematics(robot.home[None, :])[0]
+    try:
+        home = robot.forward_kinematics(robot.home[None, :])[0]
+    except (ModelError, MotionError):  # a robot that cannot be assembled at home
+        return error
 
     def reached(shares: FloatArray) -> NDArray[np.bool_]:
         return robot.reach(home + shares[:, None] * (x[sample] - home)).reachable
