@@ -218,3 +218,11 @@ def test_out_of_memory_is_one_line(workbench: Workbench, monkeypatch: pytest.Mon
     done = workbench("run", "small.toml")
     assert (done.code, done.complaint) == (2, ["workbench: out of memory; fewer samples need less"])
     assert os.listdir(workbench.directory) == before
+
+
+def test_a_message_keeps_its_beginning_and_its_end(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli._complain(f"file.toml: {'many words ' * 5000}; name another", 2) == 2
+    line = capsys.readouterr().err
+    assert line.startswith("workbench: file.toml: many words")
+    assert line.endswith("; name another\n")
+    assert len(line) < 1500

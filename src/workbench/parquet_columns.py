@@ -61,6 +61,10 @@ def read_columns(
     return table
 
 
+def _is_text(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
+
+
 def _judged(
     path: Path,
     file: pq.ParquetFile,
@@ -77,7 +81,7 @@ def _judged(
             raise OutputError(f'{path}: column "{name[:60]}" {found}', column=name)
         kind = file.schema_arrow.field(name).type
         if name in texts:
-            fits, allowed = pa.types.is_string(kind) or pa.types.is_dictionary(kind), "texts"
+            fits, allowed = _is_text(kind.value_type if pa.types.is_dictionary(kind) else kind), "texts"
         elif name in indices:
             fits, allowed = pa.types.is_integer(kind), "whole numbers"
         else:

@@ -188,7 +188,7 @@ LONGEST_NUMBER = 40
 LARGEST_COUNT = 1e12
 
 VERDICTS = ("pass", "fail", "measured", "expected-fail", "unexpected-pass", "undecided", "agrees", "differs")
-KINDS = ("verification", "modelling", "expected-failure", "recorded", "contrast")
+KINDS = ("verification", "modelling", "expected-failure", "recorded", "contrast", "unbounded")
 
 REQUIRED_COLUMNS = (
     *("case", "candidate", "reference", "joint", "peak_error", "rms_error", "pointwise_error", "worst_time_s"),
