@@ -17,6 +17,7 @@ from workbench.campaign.recorded_spec import RecordedSpec
 from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.user_candidates import UserCandidate, offer
 from workbench.capabilities.load import robot_with
+from workbench.capabilities.nearest import with_nearest
 from workbench.capabilities.robot import Robot
 from workbench.data_files import bundled, bundled_names
 from workbench.documents import shorten
@@ -277,7 +278,8 @@ def case_on(
 ) -> Case:
     """Put a robot on a motion that has been planned, by `plan_motion` or by other means.
 
-    With *nearest* an error of a motion of joints names the nearest coordinates that can be driven.
+    With *nearest* an error names the last pose on the way from home that can be driven, which takes as long as some
+    cases do: a sweep, which leaves such cases out by the thousand, does not ask for it.
 
     Raises
     ------
@@ -296,7 +298,9 @@ def case_on(
         if robot.closed_form is not None:  # else the reference has just computed these torques
             robot.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
     except MotionError as error:
-        if nearest and isinstance(planned, JointMotion):
+        if nearest and isinstance(planned, PlatformMotion):
+            error = with_nearest(error, robot, planned.x)
+        elif nearest and isinstance(planned, JointMotion):
             error = with_nearest_joints(error, robot, planned.q)
         raise with_unit_hint(at_time(error, planned.t), robot) from error
     force = np.tile(np.array(spec.external_force), (len(motion.t), 1))

@@ -229,13 +229,7 @@ class Robot(RobotIdentity):
     def joint_motion(self, x: ArrayLike, xd: ArrayLike, xdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Actuated position, velocity and acceleration, each ``(n, na)``, from a motion in task coordinates."""
         own = self._own("joint_motion")
-        if not own:
-            return self.reference.joint_motion(x, xd, xdd, self.coordinates)
-        try:
-            found: tuple[FloatArray, FloatArray, FloatArray] = own(x, xd, xdd)
-        except MotionError as error:
-            raise with_nearest(error, self, x) from None
-        return found
+        return own(x, xd, xdd) if own else self.reference.joint_motion(x, xd, xdd, self.coordinates)
 
     def reach(self, x: ArrayLike) -> Reach:
         """Inverse kinematics that marks poses out of reach instead of refusing them; x ``(n, m)``."""

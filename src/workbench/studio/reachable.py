@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from workbench.capabilities.nearest import last_reached
+
 HALVINGS = 5
 """Of the way between the last value in reach and the first out of it: a thirtieth of a step is left open."""
 
@@ -38,25 +40,7 @@ def reach_of(
 
 
 def _outwards(value: float, end: float, feasible: Callable[[float], bool], stopped: Callable[[], bool]) -> float:
-    inside, outside = value, None
-    for step in range(1, STEPS + 1):
-        tried = end if step == STEPS else value + (end - value) * step / STEPS
-        if stopped():
-            return inside
-        if tried == inside:
-            continue
-        if not feasible(tried):
-            outside = tried
-            break
-        inside = tried
-    if outside is None:
-        return end
-    for _ in range(HALVINGS):
-        if stopped():
-            return inside
-        middle = 0.5 * (inside + outside)
-        if feasible(middle):
-            inside = middle
-        else:
-            outside = middle
-    return inside
+    def at(share: float) -> float:
+        return end if share == 1.0 else value + share * (end - value)
+
+    return end if value == end else at(last_reached(lambda share: feasible(at(share)), STEPS, HALVINGS, stopped))
