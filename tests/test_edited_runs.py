@@ -18,7 +18,7 @@ from test_report import make_run
 from workbench.campaign import verdict
 from workbench.errors import OutputError
 from workbench.parquet_columns import read_columns
-from workbench.report import load
+from workbench.report import tables
 from workbench.report.build import build_report
 from workbench.report.load import load_run
 
@@ -99,7 +99,7 @@ def test_a_word_or_number_that_no_run_writes(run: Path, column: str, value: str,
 
 def test_the_reader_knows_every_word_that_a_run_writes() -> None:
     written = {value for name, value in vars(verdict).items() if name.isupper() and isinstance(value, str)}
-    assert written == {*load.VERDICTS, *load.KINDS}
+    assert written == {*tables.VERDICT_STATUS, *tables.KINDS}
 
 
 @pytest.mark.parametrize("version", [True, 1.0, "1", None])

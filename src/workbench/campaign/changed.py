@@ -8,6 +8,9 @@ from typing import Any
 
 CASE = "case parameters"
 """By what the campaign itself changes single cases."""
+ANOTHER = "Another robot than the one that the campaign is about"
+NOT_JUDGED = "Claims about that one are not judged where this concerns them."
+"""What stands over `sentences`."""
 SHOWN = 8
 """Names that a sentence lists one by one."""
 

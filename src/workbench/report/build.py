@@ -10,10 +10,12 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
 from workbench.report.cost import cost_table
 from workbench.report.data_out import DATA_FORMATS, data_files
@@ -164,16 +166,25 @@ def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     page = environment.get_template("report.html.j2")
     text = page.render(
-        manifest=run.manifest,
-        circumstances=circumstances(run.manifest),
-        changes=changes(run.manifest),
-        costs=cost_table(run.manifest),
+        **_head(run),
         sections=bodies,
         style=Markup(style + sheet.rules),
         script=Markup(script),
         script_hash=f"sha256-{digest}",
     )
     return _without_blank_lines(text)
+
+
+def _head(run: Run | SweepRun) -> dict[str, Any]:
+    """What stands over the sections."""
+    return {
+        "manifest": run.manifest,
+        "circumstances": circumstances(run.manifest),
+        "another": ANOTHER,
+        "not_judged": NOT_JUDGED,
+        "changes": changes(run.manifest),
+        "costs": cost_table(run.manifest),
+    }
 
 
 def _source(environment: Environment, name: str) -> str:
@@ -200,10 +211,7 @@ def render_markdown(run: Run | SweepRun, sections: list[Section]) -> str:
         for section in sections
     ]
     text = environment.get_template("report.md.j2").render(
-        manifest=run.manifest,
-        changes=changes(run.manifest),
-        circumstances=circumstances(run.manifest),
-        costs=cost_table(run.manifest),
+        **_head(run),
         sections=bodies,
     )
     return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"

@@ -18,6 +18,7 @@ from workbench.errors import OutputError
 from workbench.parquet_columns import read_columns
 from workbench.records import read_record, read_text
 from workbench.report.manifest import FORMAT_VERSION, Manifest
+from workbench.report.tables import KINDS, VERDICT_STATUS
 
 LARGEST_SERIES = 500_000_000
 """Bytes of one case's time series that are read."""
@@ -187,9 +188,6 @@ LONGEST_NUMBER = 40
 
 LARGEST_COUNT = 1e12
 
-VERDICTS = ("pass", "fail", "measured", "expected-fail", "unexpected-pass", "undecided", "agrees", "differs")
-KINDS = ("verification", "modelling", "expected-failure", "recorded", "contrast", "unbounded")
-
 REQUIRED_COLUMNS = (
     *("case", "candidate", "reference", "joint", "peak_error", "rms_error", "pointwise_error", "worst_time_s"),
     *("bound", "verdict", "kind", "peak_reference", "unit", "pointwise_skipped"),
@@ -277,7 +275,7 @@ def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
         pointwise_error=error("pointwise_error"),
         worst_time_s=number("worst_time_s"),
         bound=bound(),
-        verdict=word("verdict", VERDICTS),
+        verdict=word("verdict", tuple(VERDICT_STATUS)),
         kind=word("kind", KINDS),
         peak_reference=number("peak_reference"),
         unit=record["unit"],

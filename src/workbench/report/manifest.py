@@ -301,6 +301,11 @@ class CaseRecord(Record):
     kinematics_checks: tuple[KinematicsRecord, ...] = ()
     warnings: tuple[str, ...] = ()
 
+    @property
+    def kinematics_verdicts(self) -> list[str]:
+        """Verdicts on the user's own kinematics."""
+        return [check.verdict for check in self.kinematics_checks]
+
 
 class ChangeRecord(Record):
     """One parameter that is not what the robot's source says, SI."""

@@ -18,6 +18,7 @@ import matplotlib as mpl
 import typst
 from PIL import Image
 
+from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
 from workbench.records import reason
 from workbench.report.case_section import CaseView
@@ -38,10 +39,6 @@ LONG = 36
 """Letters from which on a column of a table breaks its lines."""
 FONTS = {"page": "DejaVu Sans", "paper": "DejaVu Serif"}
 """Letters of drawings, by style: those that matplotlib brings and has measured them with."""
-CHANGED = (
-    "Another robot than the one that the campaign is about. Claims about that one are not judged where this concerns"
-    " them."
-)
 FIGURE = """#set document(date: none)
 #set page(width: auto, height: auto, margin: 0pt)
 #image("figure.svg")
@@ -60,7 +57,7 @@ def report_pdf(run: Run | SweepRun, sections: Sequence[Section], style: str = "p
         "campaign": manifest.campaign,
         "description": manifest.description,
         "run": " ".join(circumstances(manifest)),
-        "changed": CHANGED,
+        "changed": f"{ANOTHER}. {NOT_JUDGED}",
         "changes": list(changes(manifest)),
         "paper": PAPERS[paper],
         "costs": _table(costs) if costs else None,

@@ -21,7 +21,7 @@ from workbench.studio.motions import own_samples, scaled, scaled_spec, thinned_s
 from workbench.studio.state import State
 from workbench.studio.subject import Subject
 
-ERRORS_ONLY = Effort(budget=False, drawing=False, timed=False)
+ERRORS_ONLY = Effort.of_many()
 """What a sweep gathers: no power balance, no replay."""
 
 
