@@ -149,7 +149,9 @@ def _figures(section: Section, views: Iterable[Any], style: str, parts: dict[str
     titles = {}
     for view in views:
         record = view.record
-        told = " ".join(text for text in (record.title, f"{record.source}." if record.source else "") if text)
+        source = f"{record.source}." if record.source else ""
+        other = f"Not for the robot of the source: {record.not_about}." if record.not_about else ""
+        told = " ".join(text for text in (record.title, source, other) if text)
         if view.plot is None:
             yield _text(f"{told} {view.missing}")
         else:
@@ -168,7 +170,9 @@ def _case(view: CaseView, style: str, parts: dict[str, str]) -> Iterator[Block]:
         yield {"kind": "notice", "text": f"Warning: {warning}"}
     yield {"kind": "facts", "facts": [list(fact) for fact in view.facts]}
     yield from _plots(view.plots, style, parts, {})
-    if view.film is not None and view.film.still:
+    if view.film is not None and view.film.note:
+        yield _text(f"No rendered picture: {view.film.note}.")
+    elif view.film is not None and view.film.still:
         name = f"{view.anchor}-still.svg"
         parts[name] = _picture(view.film.still, view.film.still_file)
         caption = "The robot's model as MuJoCo renders it, at the first moment of this case"
@@ -183,13 +187,14 @@ def _plots(plots: Sequence[Plot], style: str, parts: dict[str, str], titles: Map
         name = f"{plot.key}.svg"
         parts[name] = _drawing(plot, style)
         shown = _figure(name, titles.get(plot.key, plot.caption), plot.alt)
-        if plot.size[0] > FULL_WIDTH_FROM:
+        wide = plot.size[0] > FULL_WIDTH_FROM
+        if row and (wide or len(row) == 2):
+            yield {"kind": "plots", "plots": row, "wide": False}
+            row = []
+        if wide:
             yield {"kind": "plots", "plots": [shown], "wide": True}
         else:
             row.append(shown)
-        if len(row) == 2:
-            yield {"kind": "plots", "plots": row, "wide": False}
-            row = []
     if row:
         yield {"kind": "plots", "plots": row, "wide": False}
 
@@ -216,16 +221,20 @@ def _table(table: Table) -> Block:
             for column, length in zip(table.columns, longest, strict=True)
         ],
         "rows": [
-            [{"text": _shown(cell), "strong": cell.emphasis, "link": cell.link or "", **_colour(cell)} for cell in row]
+            [
+                {
+                    "text": _shown(cell),
+                    "strong": cell.emphasis,
+                    "link": cell.link or "",
+                    "status": cell.status.key if cell.status else "",
+                }
+                for cell in row
+            ]
             for row in table.rows
         ],
         "reading": table.reading,
     }
 
 
-def _colour(cell: Cell) -> Block:
-    return {"status": cell.status.key if cell.status else ""}
-
-
 def _shown(cell: Cell) -> str:
-    return f"{cell.status.symbol} {cell.status.text}".strip() if cell.status else cell.text
+    return _badge(cell.status)["badge"] if cell.status else cell.text
