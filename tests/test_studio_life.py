@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-import queue
 import re
 import signal
 import subprocess
 import sys
-import threading
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from talking_process import TalkingProcess
 
 viser = pytest.importorskip("viser", reason="the extra studio is not installed")
 
@@ -26,37 +26,16 @@ PATIENCE = 120.0
 PORT = 18765
 
 
-class Studio:
+class Studio(TalkingProcess):
     """A studio in a process of its own."""
 
     def __init__(self, *arguments: str, cwd: Path | None = None) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "workbench.cli", "studio", *arguments],
-            cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
-        )  # fmt: skip
-        self._lines: queue.Queue[str] = queue.Queue()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
+        super().__init__("studio", *arguments, cwd=cwd, patience=PATIENCE)
         self.said: list[str] = []
-
-    def __enter__(self) -> Studio:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.process.wait()
-        self._reader.join()
-        assert self.process.stdout
-        self.process.stdout.close()
-
-    def _read(self) -> None:
-        assert self.process.stdout
-        for line in self.process.stdout:
-            self._lines.put(line)
 
     def until(self, pattern: str) -> str:
         while True:
-            line = self._lines.get(timeout=PATIENCE)
+            line = self.line()
             self.said.append(line)
             if found := re.search(pattern, line):
                 return found.group()

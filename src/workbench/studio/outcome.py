@@ -14,7 +14,6 @@ from workbench.campaign.cases import Case, case_on, plan_motion
 from workbench.campaign.compare import Row, compute_case
 from workbench.campaign.evidence import Effort
 from workbench.campaign.motion_spec import TableMotion
-from workbench.campaign.spec import CaseSpec
 from workbench.reference import ReferenceResult
 from workbench.rendering.solids import Movement, Solid, movement, solids
 from workbench.studio.motions import own_samples, scaled, scaled_spec, thinned_spec
@@ -110,18 +109,13 @@ def case_of(subject: Subject, state: State) -> Case:
     WorkbenchError
         A value that may not be, or a pose out of reach.
     """
-    spec, overrides = spec_of(subject, state.case), overrides_of(subject, state)
+    spec, overrides = subject.spec(state.case), overrides_of(subject, state)
     robot = subject.base.with_parameters(**overrides) if overrides else subject.base
     shown = thinned_spec(scaled_spec(spec, state.amplitude, state.speed))
     planned = plan_motion(shown, subject.file, robot)
     if isinstance(spec.motion, TableMotion):
         planned = scaled(planned, state.amplitude, state.speed)
     return case_on(shown, subject.model, overrides, robot, planned)
-
-
-def spec_of(subject: Subject, case: str) -> CaseSpec:
-    """The case as the campaign has it."""
-    return next(one for one in subject.campaign.case if one.name == case)
 
 
 def overrides_of(subject: Subject, state: State) -> dict[str, float]:
@@ -146,7 +140,7 @@ def compute(subject: Subject, state: State) -> Outcome:
     names = tuple(dict.fromkeys(row.reference for row in rows)) or ("distributed",)
     # the poses are kept from the call before, so that this one costs little
     result = reference.inverse_dynamics(motion.q, motion.qd, motion.qdd, names[0], case.force, along=motion.t)
-    model, spec = reference.compiled(), spec_of(subject, state.case)
+    model, spec = reference.compiled(), subject.spec(state.case)
     table = isinstance(spec.motion, TableMotion)
     return Outcome(
         state=state,

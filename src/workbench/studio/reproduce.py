@@ -19,7 +19,7 @@ from workbench.errors import OutputError, WorkbenchError
 from workbench.robots.edit import edit_file
 from workbench.robots.parameters import ParameterTable
 from workbench.studio.motions import as_table, scaled_spec
-from workbench.studio.outcome import Outcome, overrides_of, spec_of
+from workbench.studio.outcome import Outcome, overrides_of
 from workbench.studio.session import Session
 from workbench.studio.state import State
 
@@ -65,7 +65,7 @@ def set_command(session: Session) -> str:
 def _over_campaign(session: Session) -> dict[str, float]:
     """Parameters that are not what campaign and case say: those of a run, of the command line, and by hand."""
     subject, state = session.subject, session.good.state
-    table, spec = subject.base.description.table, spec_of(subject, state.case)
+    table, spec = subject.base.description.table, subject.spec(state.case)
     own = table.expand(table.layered(subject.campaign.parameters, spec.parameters))
     wanted = table.expand(session.overrides())
     return {name: value for name, value in wanted.items() if own.get(name) != value}
@@ -80,7 +80,7 @@ def campaign_case(session: Session, name: str) -> tuple[str, dict[str, str]]:
         TOML for the end of the campaign's file; of a robot without a campaign a whole campaign. File name -> content.
     """
     subject, state = session.subject, session.good.state
-    spec = spec_of(subject, state.case)
+    spec = subject.spec(state.case)
     table = subject.base.description.table
     shown = scaled_spec(spec, state.amplitude, state.speed)
     motion: dict[str, Any] = shown.motion.model_dump(exclude_none=True)

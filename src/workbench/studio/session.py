@@ -108,7 +108,7 @@ class Session:
 
     def put_on(self, case: str) -> State:
         """Take another case of the campaign; what was changed by hand stays."""
-        self.subject.start(case) if case in [c.name for c in self.subject.campaign.case] else self._first(case)
+        self._first(case)  # refuses a case that there is not
         return self.history.change(case=case)
 
     def move(self, gesture: Hashable = None, **factors: float) -> State:

@@ -13,7 +13,7 @@ from workbench.campaign import provenance, store
 from workbench.campaign.candidate_spec import CandidateSpec
 from workbench.campaign.cases import base_robot, resolve_case, resolve_cases, robot_of
 from workbench.campaign.rerun import files_of
-from workbench.campaign.spec import Campaign, campaign_names, load_campaign
+from workbench.campaign.spec import Campaign, CaseSpec, campaign_names, load_campaign
 from workbench.campaign.user_candidates import UserCandidate, load_candidates, offer, with_rows
 from workbench.capabilities.load import robot_with
 from workbench.capabilities.robot import Robot
@@ -73,12 +73,16 @@ class Subject:
         """The model as a command from here names it."""
         return str(self.other_model) if self.other_model else _shown(self.model, "models")
 
+    def spec(self, case: str) -> CaseSpec:
+        """A case as the campaign has it."""
+        return next(one for one in self.campaign.case if one.name == case)
+
     def start(self, case: str) -> dict[str, float]:
         """The parameters of a case that differ from the file's: the campaign's, the case's, the command line's.
 
         Of a run those that it was computed with.
         """
-        spec = next(one for one in self.campaign.case if one.name == case)
+        spec = self.spec(case)
         table = self.base.description.table
         if self.run is not None and case in self.run.parameters:
             return table.layered(self.run.parameters[case], self.settings)

@@ -8,6 +8,7 @@ from html import escape
 
 import numpy as np
 
+from workbench.campaign.compare import Row
 from workbench.campaign.verdict import EXPECTED_FAIL, FAIL, PASS, UNEXPECTED_PASS
 from workbench.studio.outcome import Outcome
 from workbench.studio.reproduce import grouped
@@ -96,8 +97,8 @@ def _about(session: Session) -> Iterable[str]:
 
 def _beyond_campaign(session: Session) -> bool:
     """Whether the robot has other parameters than the campaign gives it, by the command line or a run."""
-    subject, case = session.subject, session.good.state.case
-    spec = next(one for one in subject.campaign.case if one.name == case)
+    subject = session.subject
+    spec = subject.spec(session.good.state.case)
     table = subject.base.description.table
     own = table.changed(subject.base.values, table.layered(subject.campaign.parameters, spec.parameters))
     return own != dict(session.good.case.robot.values)
@@ -127,9 +128,8 @@ def verdict(session: Session) -> str:
     return _page(parts)
 
 
-def _judged(rows: Sequence[object]) -> str:
-    verdicts = {row.verdict for row in rows}  # type: ignore[attr-defined]
-    bound = rows[0].bound  # type: ignore[attr-defined]
+def _judged(rows: Sequence[Row]) -> str:
+    verdicts, bound = {row.verdict for row in rows}, rows[0].bound
     if bound is None:
         return "measured"
     if verdicts == {PASS}:
