@@ -25,6 +25,7 @@ from workbench.errors import MotionError, SpecError, WorkbenchError, did_you_mea
 from workbench.motion import JointMotion, PlatformMotion
 from workbench.recorded.read import Record
 from workbench.reference.replay import motion_through
+from workbench.robots.actuators import check_joints
 from workbench.robots.assignments import resolve_changes
 from workbench.robots.catalogue import bundled_robot, bundled_robots
 from workbench.robots.robot_file import FILE, RobotFile, read_robot_file
@@ -88,6 +89,7 @@ def resolve_cases(
         One line that names the case and, for motions, the time and the joint.
     """
     base, path = base_robot(campaign, file, model, users)
+    check_joints(campaign.actuators or {}, base.joints, str(file))
     names = [case.name for case in campaign.case]
     for name in only:
         if name not in names:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.campaign import store
+from workbench.campaign.actuators import Margin, limits_of, margins_of_facts
 from workbench.campaign.cases import Case, resolve_cases, with_unit_hint
 from workbench.campaign.changes import IN_CAMPAIGN, Changes, Variant, changes_of
 from workbench.campaign.claims import judge_claims
@@ -20,6 +21,7 @@ from workbench.campaign.conclusion import CaseOutcome, Conclusion, case_status, 
 from workbench.campaign.cost import cost_us
 from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.figure_spec import FigureSpec
+from workbench.campaign.good import check_asked, with_good
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
 from workbench.campaign.not_driven import NotDriven
@@ -39,6 +41,11 @@ class Outcome:
     conclusion: Conclusion
     rows: list[Row]
     manifest: dict[str, Any]
+
+    @property
+    def margins(self) -> list[Margin]:
+        """Every case held against every limit of an actuator; empty where nobody gave limits."""
+        return margins_of_facts(self.manifest)
 
     @property
     def passed(self) -> bool:
@@ -88,6 +95,7 @@ def run_campaign(
     explain: Explain | None = None,
     keep_going: bool = False,
     replace: bool = False,
+    good: float | None = None,
 ) -> Outcome:
     """Run a campaign and write its run directory.
 
@@ -125,6 +133,8 @@ def run_campaign(
         Record cases that cannot be driven, each with the nearest pose that can, and compute the others.
     replace
         Put the run in the place of an earlier one that holds what this one does not: other cases, another robot.
+    good
+        Wanted accuracy of formulas without a bound, in place of the campaign's: a fraction, 0.02 is 2 %.
 
     Raises
     ------
@@ -141,7 +151,7 @@ def run_campaign(
     )
     users = load_candidates(candidates)
     own = {candidate.name for candidate in campaign.candidate}
-    campaign = with_rows(campaign, users)
+    campaign = with_good(with_rows(campaign, users), good)
     if campaign.sweep:
         if not only or pick is None:
             raise SpecError(f"{file}: has a sweep; workbench.sweep.run.run_sweep runs it")
@@ -152,6 +162,7 @@ def run_campaign(
         names = [case.name for case in campaign.case if not only or case.name in only]
         refuse_loss(directory, campaign.name, request, names, {candidate.name for candidate in campaign.candidate})
     check_engines(effort.engines)
+    check_asked(campaign, str(file))
     missing: list[NotDriven] = []
     left_out = missing.append if keep_going else None
     cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users, left_out)
@@ -197,10 +208,12 @@ def run_campaign(
             "verdict": conclusion.sentence,
             "engines": list(effort.engines),
             "budget": effort.budget,
+            "good": campaign.good,
         }
         if explain:
             manifest["diagnosis"] = _explained(cases, rows, path, candidates, explain)
-        store.write_summary(stage, rows, [case.name for case in cases if changes.why_not(case.name)])
+        changed = [case.name for case in cases if changes.why_not(case.name)]
+        store.write_summary(stage, rows, changed, campaign.good)
         store.write_manifest(stage, manifest)
         if pictures:
             pictures.finish(stage)
@@ -312,5 +325,6 @@ def _manifest(
         | ({RAW_INVERSE: RAW_DESCRIPTION} if any(row.candidate == RAW_INVERSE for row in rows) else {}),
         "claims": judge_claims(campaign, own, rows, facts, {case.name: case.robot for case in cases}, changes),
         "figures": [_figure(kept, changes) for figure in campaign.figure if (kept := figure.among(computed))],
+        "actuators": limits_of(campaign, robot, str(file)),
         "cases": dict(facts),
     }

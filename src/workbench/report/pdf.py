@@ -121,6 +121,9 @@ def _blocks(section: Section, style: str, parts: dict[str, str]) -> Iterator[Blo
         yield {"kind": "verdict", **_badge(context["status"]), "sentence": context["sentence"]}
     if context.get("about"):
         yield _text(context["about"])
+    if context.get("attention"):
+        yield _text("Needs attention (no failure of a formula; the verdict stands):")
+        yield {"kind": "points", "points": list(context["attention"])}
     for name, found in context.get("diagnosis", {}).items():
         told = f"What is wrong with {name}, held against MuJoCo's {found.reference} model part by part:"
         yield _text(told)
