@@ -113,13 +113,23 @@ def with_good(campaign: Campaign, good: float | None) -> Campaign:
     SpecError
         No fraction between 0 and 1.
     """
-    if good is None:
-        return campaign
-    try:
-        check_fraction(good)
-    except ValueError as error:
-        raise SpecError(f"--good {good:g}: {error}", key="good", value=good) from error
-    return campaign.model_copy(update={"good": good})
+    refuse_no_fraction(good)
+    return campaign if good is None else campaign.model_copy(update={"good": good})
+
+
+def refuse_no_fraction(good: float | None) -> None:
+    """Refuse a wanted accuracy of the command line that is no fraction; None is nothing wanted.
+
+    Raises
+    ------
+    SpecError
+        No number between 0 and 1.
+    """
+    if good is not None:
+        try:
+            check_fraction(good)
+        except ValueError as error:
+            raise SpecError(f"--good {good:g}: {error}", key="good", value=good) from error
 
 
 def check_asked(campaign: Campaign, where: str) -> None:

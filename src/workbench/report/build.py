@@ -8,7 +8,7 @@ import gc
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -154,6 +154,11 @@ def _rendered(
 
 def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
     """Return the whole page."""
+    return html_page("report.html.j2", sections, _head(run))
+
+
+def html_page(template: str, sections: Sequence[Section], head: Mapping[str, Any]) -> str:
+    """Return a page that loads nothing from elsewhere: *template* around the sections, *head* is what stands above."""
     environment = _environment()
     sheet = StyleSheet()
     environment.globals["inline_svg"] = lambda plot: Markup(sheet.shorten(inline(plot.svg, plot.alt)))
@@ -164,9 +169,9 @@ def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
     style = _source(environment, "style.css")
     script = _source(environment, "report.js")
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
-    page = environment.get_template("report.html.j2")
+    page = environment.get_template(template)
     text = page.render(
-        **_head(run),
+        **head,
         sections=bodies,
         style=Markup(style + sheet.rules),
         script=Markup(script),
