@@ -189,7 +189,8 @@ def print_outcome(outcome: Outcome) -> None:
 
 def _print_attention(outcome: Outcome) -> None:
     """Print what changes no verdict and still has to be looked at: accuracy that was asked for, actuators too small."""
-    for found in answers(outcome.rows, outcome.manifest["good"]):
+    unknown = [name for name, case in outcome.manifest["cases"].items() if case["status"] == NOT_DRIVEN]
+    for found in answers(outcome.rows, outcome.manifest["good"], unknown):
         out.print(Text(found.sentence, style=ANSWERS[found.answer]), soft_wrap=True)
     held = outcome.margins
     small = shortfalls(held)
@@ -198,7 +199,7 @@ def _print_attention(outcome: Outcome) -> None:
     for sentence in small:
         out.print(Text(f"  {sentence}", style="yellow"), soft_wrap=True)
     if held and not small:
-        out.print(Text(answer(held)), soft_wrap=True)
+        out.print(Text(answer(held, unknown)), soft_wrap=True)
 
 
 def _print_recorded(manifest: dict[str, Any]) -> None:

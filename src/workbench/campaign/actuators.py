@@ -14,6 +14,7 @@ from typing import Any, Protocol
 
 from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case
+from workbench.campaign.changed import not_known
 from workbench.campaign.spec import Campaign
 from workbench.capabilities.robot import Robot
 from workbench.demand import demand_of
@@ -165,10 +166,15 @@ def shortfalls(found: Sequence[Margin]) -> list[str]:
     return said
 
 
-def answer(found: Sequence[Margin]) -> str:
-    """Whether the actuators are big enough, in a sentence; empty where nobody gave limits."""
-    if not found:
-        return ""
+def answer(found: Sequence[Margin], unknown: Sequence[str] = ()) -> str:
+    """Whether the actuators are big enough, in a sentence; empty where nobody gave limits.
+
+    *unknown* names the cases that were not computed.
+    """
+    return f"{_answer(found)}{not_known(unknown)}" if found else ""
+
+
+def _answer(found: Sequence[Margin]) -> str:
     tight = max(found, key=lambda margin: math.inf if math.isnan(margin.used) else margin.used)
     small = list(dict.fromkeys(margin.joint for margin in found if margin.too_much))
     if small:

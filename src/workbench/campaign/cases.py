@@ -109,6 +109,7 @@ def resolve_cases(
         if only and spec.name not in only:
             continue
         overrides: dict[str, float] = {}
+        robot = None
         try:
             overrides = table.layered(campaign.parameters, spec.parameters, settings or {})
             if relative:
@@ -126,7 +127,7 @@ def resolve_cases(
             named = _in_case(error, file, spec.name)
             if left_out is None or not isinstance(named, MotionError):
                 raise named from error
-            left_out(NotDriven(spec, named, overrides))
+            left_out(NotDriven(spec, named, overrides, robot))
     return cases
 
 

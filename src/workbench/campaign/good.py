@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from workbench.campaign.changed import few
+from workbench.campaign.changed import few, not_known
 from workbench.campaign.spec import Campaign, check_fraction
 from workbench.campaign.verdict import SHARE, WITHOUT_BOUND
 from workbench.errors import SpecError
@@ -63,6 +63,8 @@ class Answer:
     reference: str
     good: float
     rows: tuple[Measured, ...]
+    unknown: tuple[str, ...] = ()
+    """cases that were not computed: nothing is known of them"""
 
     def _with(self, answer: str) -> list[Measured]:
         return [row for row in self.rows if good_enough(row, self.good) == answer]
@@ -74,13 +76,19 @@ class Answer:
 
     @property
     def sentence(self) -> str:
-        """The answer in words, with what decides it: the worst joint and case."""
+        """The answer in words, with what decides it: the worst joint and case, and what it does not cover."""
+        return self._told + not_known(self.unknown)
+
+    @property
+    def _told(self) -> str:
         rows = self.rows
         worst = max(rows, key=lambda row: math.inf if math.isnan(row.peak_error) else row.peak_error)
         at = f"{100 * worst.peak_error:.3g} % on {worst.joint} in case {worst.case} at {worst.worst_time_s:.4g} s"
         asked = f"Is {self.candidate} good enough, within {100 * self.good:.3g} % of {self.reference} on every joint?"
         if self.answer == YES:
-            return f"{asked} Yes: the largest error is {at}."
+            count = len({row.case for row in rows})
+            of = f" in the {count} case{'s' if count > 1 else ''} that could be computed" if self.unknown else ""
+            return f"{asked} Yes{of}: the largest error is {at}."
         if self.answer == UNDECIDED:
             names = few(list(dict.fromkeys(row.case for row in self._with(UNDECIDED))))
             return f"{asked} Undecided: the reference's own uncertainty is too large in {names}."
@@ -94,15 +102,18 @@ class Answer:
         return f"{asked} No: {at}; no in {where}{rest}."
 
 
-def answers(rows: Iterable[Measured], good: float | None) -> list[Answer]:
-    """Answer for each formula without a bound, in the order of the rows; nothing where nobody asked."""
+def answers(rows: Iterable[Measured], good: float | None, unknown: Sequence[str] = ()) -> list[Answer]:
+    """Answer for each formula without a bound, in the order of the rows; nothing where nobody asked.
+
+    *unknown* names the cases that were not computed.
+    """
     if good is None:
         return []
     groups: dict[tuple[str, str], list[Measured]] = {}
     for row in rows:
         if good_enough(row, good):
             groups.setdefault((row.candidate, row.reference), []).append(row)
-    return [Answer(candidate, reference, good, tuple(found)) for (candidate, reference), found in groups.items()]
+    return [Answer(*names, good, tuple(found), tuple(unknown)) for names, found in groups.items()]
 
 
 def with_good(campaign: Campaign, good: float | None) -> Campaign:

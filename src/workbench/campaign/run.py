@@ -29,6 +29,7 @@ from workbench.campaign.replacing import refuse_loss, request_of
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.campaign.user_candidates import Formula, UserCandidate, load_candidates, with_rows
 from workbench.campaign.verdict import FAIL, VERIFICATION
+from workbench.capabilities.robot import Robot
 from workbench.errors import MotionError, OutputError, SpecError, WorkbenchError
 from workbench.staging import check_output, staged
 
@@ -165,7 +166,12 @@ def run_campaign(
     check_asked(campaign, str(file))
     missing: list[NotDriven] = []
     left_out = missing.append if keep_going else None
-    cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users, left_out)
+    try:
+        cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users, left_out)
+    except MotionError as error:
+        alone = len(only or campaign.case) == 1
+        hint = "" if alone else "; --keep-going (keep_going=True) records such cases and computes the others"
+        raise MotionError(f"{error}{hint}", **error.facts) from error
     _refuse_none(cases, missing)
     results: list[CaseResult] = []
     with (
@@ -181,7 +187,7 @@ def run_campaign(
             except MotionError as error:
                 if not keep_going:
                     raise
-                missing.append(NotDriven(case.spec, error, case.overrides))
+                missing.append(NotDriven(case.spec, error, case.overrides, case.robot))
                 continue
             results.append(result)
             store.write_series(stage, case.name, result.series)
@@ -196,9 +202,12 @@ def run_campaign(
         found = {result.name: _judged(result) for result in results} | {m.spec.name: m.facts() for m in missing}
         facts = {case.name: found[case.name] for case in campaign.case if case.name in found}
         conclusion = conclude(rows, {name: _outcome(said) for name, said in facts.items()})
-        variants = [Variant(case.name, case.robot, case.spec.parameters) for case in cases]
+        robots = {case.name: case.robot for case in cases}
+        robots |= {one.spec.name: one.robot for one in missing if one.robot is not None}
+        ordered = [spec for spec in campaign.case if spec.name in robots]
+        variants = [Variant(spec.name, robots[spec.name], spec.parameters) for spec in ordered]
         changes = changes_of(campaign, file, model, settings or {}, relative, variants)
-        manifest = _manifest(campaign, file, cases, facts, rows, changes, own) | {
+        manifest = _manifest(campaign, file, cases, robots, facts, rows, changes, own) | {
             "command": shlex.join(command),
             "request": request,
             "started": started.isoformat(timespec="seconds"),
@@ -302,6 +311,7 @@ def _manifest(
     campaign: Campaign,
     file: Path,
     cases: list[Case],
+    robots: Mapping[str, Robot],
     facts: Mapping[str, Mapping[str, Any]],
     rows: list[Row],
     changes: Changes,
@@ -323,7 +333,7 @@ def _manifest(
             for name, c in candidates.items()
         }
         | ({RAW_INVERSE: RAW_DESCRIPTION} if any(row.candidate == RAW_INVERSE for row in rows) else {}),
-        "claims": judge_claims(campaign, own, rows, facts, {case.name: case.robot for case in cases}, changes),
+        "claims": judge_claims(campaign, own, rows, facts, robots, changes),
         "figures": [_figure(kept, changes) for figure in campaign.figure if (kept := figure.among(computed))],
         "actuators": limits_of(campaign, robot, str(file)),
         "cases": dict(facts),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from workbench.campaign.actuators import Margin, margins, unit_of
 from workbench.report.manifest import Manifest
+from workbench.report.tables import NOT_COMPUTED
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,9 @@ WORDS = {
 
 
 def shared_cases(old: Manifest, new: Manifest) -> list[str]:
-    """Cases that both runs have, in the order of the second."""
-    return [name for name in new.cases if name in old.cases]
+    """Cases that both runs have computed, in the order of the second."""
+    both = [name for name in new.cases if name in old.cases]
+    return [name for name in both if not {old.cases[name].status, new.cases[name].status} & NOT_COMPUTED]
 
 
 def demands(old: Manifest, new: Manifest) -> list[Asked]:

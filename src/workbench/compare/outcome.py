@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from workbench.campaign.actuators import answer, shortfalls
+from workbench.campaign.changed import few
 from workbench.campaign.good import YES
 from workbench.compare.errors import FACTOR, FLOOR, all_worse
 from workbench.compare.runs import RunComparison
@@ -56,7 +57,7 @@ def outcome_of(found: RunComparison, factor: float = FACTOR, floor: float = FLOO
     small = shortfalls(found.margins[1])
     held = found.margins[1]
     attention = (*small, *(one.sentence for one in found.answers[1] if one.answer != YES))
-    enough = answer(held) if held and not small else ""
+    enough = answer(held, found.apart) if held and not small else ""
     key, word, sentence = _judged(found, worse, factor)
     return ComparisonOutcome(key, word, sentence, worse, attention, tuple(small), enough, good)
 
@@ -68,4 +69,5 @@ def _judged(found: RunComparison, worse: Sequence[str], factor: float) -> tuple[
         return NOTHING, "NOTHING COMPARED", "the runs have no error in common."
     alone = sum(change.before is None or change.after is None for change in found.errors)
     rest = f"; {alone} errors in one run only" if alone else ""
+    rest += f"; not computed in both: {few(list(found.apart))}" if found.apart else ""
     return OK, "OK", f"nothing got worse by more than a factor of {factor:g}{rest}."

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.compare.errors import FLOOR
 from workbench.compare.outcome import NOTHING, OK, WORSE, ComparisonOutcome
 from workbench.compare.runs import RunComparison
-from workbench.compare.sections import comparison_sections
+from workbench.compare.sections import comparison_sections, in_short
 from workbench.report.build import html_page
 from workbench.report.concluded import LOOKS, conclusion_of
 from workbench.report.load import Run
@@ -27,8 +28,8 @@ class Side:
     """One of the two runs, for the head of the page."""
 
     name: str
-    changes: tuple[str, ...]
-    """in what its robot is another than the one that its campaign is about"""
+    note: str
+    """that its robot is another than the one that its campaign is about"""
     status: Status
 
 
@@ -50,7 +51,7 @@ def comparison_page(
         A series file is missing or unreadable.
     """
     a, b = (
-        Side(name, tuple(changes(run.manifest)), LOOKS[conclusion_of(run).status])
+        Side(name, f"{ANOTHER}. {NOT_JUDGED}" if changes(run.manifest) else "", LOOKS[conclusion_of(run).status])
         for run, name in zip((old, new), names, strict=True)
     )
     title = new.manifest.title or new.manifest.campaign
@@ -63,6 +64,6 @@ def comparison_page(
             "sentence": outcome.sentence[:1].upper() + outcome.sentence[1:],
             "attention": outcome.attention,
             "good": outcome.good,
-            "other": outcome.enough,
+            "other": [*([outcome.enough] if outcome.enough else []), *in_short(found)],
         }
         return html_page("compare.html.j2", comparison_sections(old, new, found, floor), head)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from workbench.campaign.changed import among, few
+from workbench.compare.asked import shared_cases
 from workbench.report.manifest import Manifest
 from workbench.report.tables import NOT_COMPUTED
 
@@ -20,7 +21,7 @@ class ParameterChange:
     before: float | None
     after: float | None
     where: str = ""
-    """`` in CASE, CASE`` where it does not concern all cases that both runs have"""
+    """`` in CASE, CASE`` where it does not concern all cases that both runs have computed"""
     unit: str = ""
     meaning: str = ""
     by: str = ""
@@ -34,7 +35,7 @@ class ParameterChange:
 
 def parameter_changes(old: Manifest, new: Manifest) -> Iterator[ParameterChange]:
     """Yield what changed from one run's robots to the other's; parameters that changed alike stand together."""
-    shared = [name for name in new.cases if name in old.cases]
+    shared = shared_cases(old, new)
     found: dict[tuple[str, float | None, float | None], list[str]] = {}
     for case in shared:
         before, after = _values(old, case), _values(new, case)

@@ -18,6 +18,7 @@ from workbench.compare.parameters import parameter_changes
 from workbench.report.concluded import conclusion_of
 from workbench.report.load import Run, load_run
 from workbench.report.manifest import ClaimRecord, Manifest
+from workbench.report.tables import NOT_COMPUTED
 
 MISSING = None
 """Stands for what a run does not have, as in JSON."""
@@ -62,6 +63,8 @@ class RunComparison:
     """of both runs, against the same limits"""
     answers: tuple[tuple[Answer, ...], tuple[Answer, ...]] = ((), ())
     """of both runs, whether formulas without a bound keep the same wanted accuracy"""
+    apart: tuple[str, ...] = ()
+    """cases that not both runs have computed; only the others are compared"""
 
     @property
     def shared(self) -> int:
@@ -94,8 +97,9 @@ def compare_loaded(old: Run, new: Run, good: float | None = None) -> RunComparis
     that has none, the first's.
     """
     shared = set(shared_cases(old.manifest, new.manifest))
+    apart = [name for name in dict.fromkeys([*old.manifest.cases, *new.manifest.cases]) if name not in shared]
     wanted = good or new.manifest.good or old.manifest.good
-    both = [tuple(answers([row for row in run.rows if row.case in shared], wanted)) for run in (old, new)]
+    both = [tuple(answers([row for row in run.rows if row.case in shared], wanted, apart)) for run in (old, new)]
     limits = margins_of_both(old.manifest, new.manifest)
     return RunComparison(
         inputs=tuple(_inputs(old.manifest, new.manifest)),
@@ -106,6 +110,7 @@ def compare_loaded(old: Run, new: Run, good: float | None = None) -> RunComparis
         reactions=tuple(reactions(old.manifest, new.manifest)),
         margins=(tuple(limits[0]), tuple(limits[1])),
         answers=(both[0], both[1]),
+        apart=tuple(apart),
     )
 
 
@@ -156,7 +161,8 @@ def _outcomes(old: Manifest, new: Manifest) -> Iterator[Difference]:
         if one is None or two is None:
             yield Difference("outcome", f'case "{name}"', one and one.status, two and two.status)
             continue
-        for field in ("status", "mobility", "rank", "redundant_rows", "idle_freedoms"):
+        computed = not {one.status, two.status} & NOT_COMPUTED
+        for field in ("status", *(("mobility", "rank", "redundant_rows", "idle_freedoms") if computed else ())):
             yield from differences("outcome", f'case "{name}" {field}', getattr(one, field), getattr(two, field))
     claims = [{claim.id: _word(claim) for claim in manifest.claims} for manifest in (old, new)]
     yield from differences("outcome", "claim", *claims)

@@ -112,8 +112,7 @@ def asked_section(found: RunComparison) -> Section:
     said: list[str] = []
     for name, margins in zip("AB", found.margins, strict=True):
         if margins:
-            said.append(f"{name}: {answer(margins)}")
-    said += [f"B, {worst.sentence}." for worst in worst_of(found.margins[1]) if worst.too_much]
+            said.append(f"{name}: {answer(margins, found.apart)}")
     if not found.margins[1]:
         said.append(
             "Neither run says what the actuators can give; with [actuators.JOINT] in robot.toml or campaign this says"
@@ -194,6 +193,23 @@ def _by_case(found: RunComparison) -> Table:
         tuple(rows),
         "Sorted by B over A when a heading is pressed.",
     )
+
+
+def in_short(found: RunComparison) -> list[str]:
+    """What B asks of actuators and joints over A, in a sentence each; empty where nothing is known."""
+    worst = list(worst_over_cases(found.demands))
+    said = []
+    for key in ("peak", "rms", "power"):
+        parts = [f"{one.item} {ratio_text(one.ratio)}" for one in worst if one.key == key]
+        said += [f"{WORDS[key]} {', '.join(parts)}"] if parts else []
+    lines = [f"B over A, the largest over the cases of both: {'; '.join(said)}."] if said else []
+    most = max(worst_over_cases(found.reactions), key=lambda one: _size(one.after), default=None)
+    if most is not None:
+        lines.append(
+            f"The largest reaction of B is {exact(most.after)} N at {most.item} in case {most.after_in}; in A the same"
+            f" joint bears {exact(most.before)} N at most."
+        )
+    return lines
 
 
 def _both(one: Asked) -> Cell:

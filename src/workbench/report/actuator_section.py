@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from workbench.campaign.actuators import Margin, answer, shortfalls, worst_of
-from workbench.report.attention import margins_of
+from workbench.report.attention import margins_of, unknown_cases
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
 from workbench.report.section import Section
@@ -29,7 +29,7 @@ def actuator_section(run: Run, anchors: Mapping[str, str]) -> Section | None:
     if not demanded:
         return None
     found = margins_of(run.manifest)
-    paragraphs = [answer(found), *shortfalls(found)] if found else [NO_LIMITS]
+    paragraphs = [answer(found, unknown_cases(run.manifest)), *shortfalls(found)] if found else [NO_LIMITS]
     tables = [
         *([limits_table(found, anchors)] if found else []),
         demand_table(run.manifest, anchors),

@@ -6,6 +6,7 @@ from workbench.campaign.actuators import Margin, margins, shortfalls
 from workbench.campaign.good import YES, answers
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
+from workbench.report.tables import NOT_COMPUTED
 
 
 def attention(run: Run) -> list[str]:
@@ -13,11 +14,16 @@ def attention(run: Run) -> list[str]:
 
     None of it is a failure of a formula against MuJoCo: the verdict stands beside it.
     """
-    answered = answers(run.rows, run.manifest.good)
+    answered = answers(run.rows, run.manifest.good, unknown_cases(run.manifest))
     return [
         *shortfalls(margins_of(run.manifest)),
         *(found.sentence for found in answered if found.answer != YES),
     ]
+
+
+def unknown_cases(manifest: Manifest) -> list[str]:
+    """Cases that were not computed."""
+    return [name for name, record in manifest.cases.items() if record.status in NOT_COMPUTED]
 
 
 def margins_of(manifest: Manifest) -> list[Margin]:

@@ -17,10 +17,12 @@ from markupsafe import Markup, escape
 
 from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
+from workbench.report.bibliography import NAME, bibliography, cited_keys
 from workbench.report.cost import cost_table
 from workbench.report.data_out import DATA_FORMATS, data_files
 from workbench.report.latex import latex_table
 from workbench.report.load import Run, load_run, read_manifest
+from workbench.report.paper_table import paper_table
 from workbench.report.section import Section
 from workbench.report.sections import build_sections
 from workbench.report.style import PAPERS, STYLES, figure_style
@@ -147,8 +149,12 @@ def _rendered(
     if "pdf" in formats:
         files[run.directory / "report.pdf"] = report_pdf(run, sections, style, paper)
         costs = cost_table(run.manifest)
-        for table in (*all_tables(sections), *([costs] if costs else [])):
-            files[run.directory / TABLES / f"{table.key}.tex"] = latex_table(table).encode()
+        tables = [*all_tables(sections), *([costs] if costs else [])]
+        if isinstance(run, Run):
+            tables.append(paper_table(run))
+        for table in tables:
+            files[run.directory / TABLES / f"{table.key}.tex"] = latex_table(table, cited_keys()).encode()
+        files[run.directory / TABLES / NAME] = bibliography().encode()
     return files
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from workbench.campaign.good import NO, UNDECIDED, YES, answers, good_enough
+from workbench.report.attention import unknown_cases
 from workbench.report.case_section import joint_heading
 from workbench.report.load import ErrorRow, Run
 from workbench.report.section import Section
@@ -25,7 +26,7 @@ def good_section(run: Run, anchors: Mapping[str, str]) -> Section | None:
     good = run.manifest.good
     if good is None:
         return None
-    found = answers(run.rows, good)
+    found = answers(run.rows, good, unknown_cases(run.manifest))
     sentences = [answer.sentence for answer in found] or ["No formula without a bound was computed."]
     tables = [good_table(run, good, anchors)] if found else []
     context = {"paragraphs": sentences, "tables": tables, "figures": (), "note": ""}
