@@ -75,7 +75,7 @@ def _float(
     if number == count - 1:
         reading = f"\n\n\\smallskip\n{{\\raggedright {latex_text(table.reading, cited, breaks=True)}\\par}}"
     return (
-        f"\\begin{{{environment}}}\n\\sloppy\n\\caption{{{caption}}}\n\\label{{tab:{label}}}\n"
+        f"\\begin{{{environment}}}\n\\centering\\sloppy\n\\caption{{{caption}}}\n\\label{{tab:{label}}}\n"
         f"\\fontsize{{{LETTERS:g}}}{{{LINE:g}}}\\selectfont\n\\setlength{{\\tabcolsep}}{{{GAP / 2:g}pt}}\n"
         f"{tabulars}{reading}\n\\end{{{environment}}}\n"
     )

@@ -36,6 +36,8 @@ BOLD = 1.18
 SIGNS = frozenset("→×±≠≈≤≥−·✓✗Δτ≡°πωφα")
 SIGN = 10.5
 """pt: the widest of them with the air of an operator."""
+POWER_SIGN = 14.5
+"""pt: the sign of a power of ten and the minus in its exponent."""
 
 
 @cache
@@ -49,8 +51,9 @@ def width_of(text: str, bold: bool = False) -> float:
     # a power's exponent is small, and around its sign stands some air: 1.2e-13 is as wide as 1.2 10 9 and a sign
     plain, powers = POWER.subn(lambda match: f"{match[1]}1099", text)
     signs = sum(plain.count(sign) for sign in SIGNS)
-    letters = _font().getlength("".join(c for c in plain if c not in SIGNS)) * LETTERS / FINE
-    return SLACK * (letters * (BOLD if bold else 1.0) + SIGN * (signs + powers)) + AIR
+    measured = "".join(c for c in plain if c not in SIGNS).replace("_", "m")  # this copy has no underscore
+    letters = _font().getlength(measured) * LETTERS / FINE
+    return SLACK * (letters * (BOLD if bold else 1.0) + SIGN * signs + POWER_SIGN * powers) + AIR
 
 
 def word_width(text: str, bold: bool = False) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from workbench.campaign.changed import ANOTHER, sentences
 from workbench.report.load import ErrorRow, Run
 from workbench.report.manifest import Manifest
 from workbench.report.tables import FAILURES, Cell, Table, columns
@@ -30,7 +31,7 @@ def paper_table(run: Run) -> Table:
     samples = sum(record.samples or 0 for record in run.manifest.cases.values())
     return Table(
         "paper",
-        f"Largest errors of closed-form inverse dynamics of {_robot(run.manifest)} against MuJoCo [MuJoCo] over"
+        f"Largest errors of formulas for {_robot(run.manifest)} against MuJoCo [MuJoCo] over"
         f" {computed} {'case' if computed == 1 else 'cases'}, {samples} samples.",
         columns(("Formula", "MuJoCo masses", *titles), titles),
         tuple(rows),
@@ -41,16 +42,12 @@ def paper_table(run: Run) -> Table:
 
 def _robot(manifest: Manifest) -> str:
     key = f" [{manifest.model.reference_key}]" if manifest.model.reference_key else ""
-    another = (
-        "a robot with changed parameters, based on " if manifest.changes.parameters or manifest.changes.model else ""
-    )
-    return f"{another}the {manifest.model.title or manifest.model.mechanism}{key}"
+    return f"the robot “{manifest.model.title or manifest.model.mechanism}”{key}"
 
 
 def _changed(manifest: Manifest) -> str:
-    if not (manifest.changes.parameters or manifest.changes.model):
-        return ""
-    return " The robot is not the one of the source: some parameters differ, in some cases or in all."
+    said = sentences(manifest.changes.model, manifest.changes.parameters, list(manifest.cases))
+    return f" {ANOTHER}: {' '.join(said)}" if said else ""
 
 
 def _dagger(rows: Sequence[ErrorRow]) -> str:
@@ -65,7 +62,7 @@ def _worst(rows: Sequence[ErrorRow]) -> Cell:
     if not math.isfinite(value):
         text = exact(value)
     elif value < PERCENT_FROM:
-        text = f"{value:.1e}"
+        text = f"{value:.0e}"
     else:
         text = f"{100 * value:.2g} %" if value < 0.1 else f"{100 * value:.0f} %"
     return Cell(text, value, emphasis=any(one.verdict in FAILURES for one in rows))
