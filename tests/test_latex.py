@@ -15,10 +15,13 @@ from test_report import make_run
 from workbench.report.bibliography import cited_keys
 from workbench.report.build import build_report
 from workbench.report.latex import latex_table
-from workbench.report.latex_layout import GAP, NARROW, TALLEST, WIDE, Content, chunks, lay_out, width_of
+from workbench.report.latex_layout import GAP, LETTERS, NARROW, TALLEST, WIDE, Content, chunks, lay_out, width_of
 from workbench.report.latex_text import latex_text
 from workbench.report.load import load_run
 from workbench.report.paper_table import paper_table
+from workbench.report.pdf import COLUMN, FULL_WIDTH_FROM, TEXT, article_size, figure_pdf
+from workbench.report.sections import build_sections
+from workbench.report.style import figure_style
 from workbench.report.tables import Cell, Table, columns
 
 FORMS = ("", "twocolumn", "11pt,twocolumn", "12pt")
@@ -165,3 +168,24 @@ def test_the_compact_table_has_the_worst_of_each_formula_and_joint(tmp_path: Pat
     assert len(shown) >= 6
     assert lay_out([Content(c.title, tuple(r[i].text for r in table.rows), c.numeric, (False,) * len(table.rows))
                     for i, c in enumerate(table.columns)], 1)[1] is False  # fmt: skip
+
+
+def test_figures_of_a_paper_are_as_wide_as_a_column_with_letters_of_the_tables(tmp_path: Path) -> None:
+    run = load_run(make_run(tmp_path / "run", cases=1, samples=20))
+    plots = [plot for section in build_sections(run) for plot in section.plots]
+    assert {plot.size[0] > FULL_WIDTH_FROM for plot in plots} == {True, False}
+    for style, letters in (("paper", {7.0, 7.5, 8.0}), ("page", {7.5, 8.0, 8.5, 9.0})):
+        for plot in plots[:3] + [plot for plot in plots if plot.size[0] > FULL_WIDTH_FROM][:1]:
+            with figure_style(style):
+                box = re.search(rb"/MediaBox\s*\[0 0 ([\d.]+) ([\d.]+)\]", figure_pdf(plot, style))
+                drawing = plot.drawn(article_size(plot))
+            assert box is not None
+            width = float(box[1]) * 72.27 / 72.0
+            room = TEXT if plot.size[0] > FULL_WIDTH_FROM else COLUMN
+            assert (width <= room + 0.01) == (style == "paper"), (plot.key, width)
+            found = {float(size) for size in re.findall(r"font-size: ([\d.]+)px", drawing)}
+            found |= {float(size) for size in re.findall(r"font: ([\d.]+)px", drawing)}
+            assert found, plot.key
+            assert found <= letters, (plot.key, found)
+            if style == "paper":
+                assert max(found) == LETTERS
