@@ -27,6 +27,9 @@ STAGES = (
 )
 """Kinds in the order in which they are tried: the next only where those before mend nothing wholly."""
 
+LIKELY = STAGES[0] | {NEGATE, SQUARE}
+"""Kinds that are tried where one edit alone brings nothing."""
+
 SHAPES = frozenset(
     {"zeros", "ones", "eye", "empty", "arange", "linspace", "reshape", "range", "len", "tile", "repeat", "swapaxes",
      "transpose", "expand_dims", "full", "roll", "broadcast_to", "candidate", "sum", "mean", "stack", "concatenate"}
@@ -366,6 +369,7 @@ def _bound(function: ast.FunctionDef) -> dict[str, int]:
     for node in ast.walk(function):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             names[node.id] = min(names.get(node.id, node.lineno), node.lineno)
+    names.pop("_", None)  # nobody means it
     return names
 
 

@@ -1,8 +1,8 @@
 """Running edited formulas quickly: of a formula that ran once, only what an edit reaches is run again.
 
 A formula is run once statement by statement, and what each wrote is kept. An edited statement is then run on what was
-there before it, and of those behind it the ones that read what has changed. What comes out only ranks edits: whatever is
-suggested has been run as the file that it is.
+there before it, and of those behind it the ones that read what has changed. What comes out only ranks edits: whatever
+is suggested has been run as the file that it is.
 """
 
 from __future__ import annotations
@@ -25,6 +25,11 @@ HEAVY_S = 1e-4
 """A call that took longer is not made again with the same arguments."""
 
 MISSING = object()
+
+
+class OutsideError(Exception):
+    """An edit stands where nothing was recorded."""
+
 
 Space = dict[str, Any]
 
@@ -55,11 +60,13 @@ class Tape:
 
         Raises
         ------
+        OutsideError
+            The formula is no function at the top of its file.
         Exception
             Whatever the formula raises.
         """
         if self._main is None:
-            raise KeyError("no function at the top of the file")
+            raise OutsideError
         self._patched(self._recorder)
         try:
             return self._globals[self._main](*arguments)
@@ -67,16 +74,18 @@ class Tape:
             self._restore()
 
     def replay(self, edit: Edit, *arguments: Any) -> Any:
-        """Run the formula with an edit; LookupError where the edit is outside of what was recorded.
+        """Run the formula with an edit.
 
         Raises
         ------
+        OutsideError
+            The edit stands outside of all functions.
         Exception
             Whatever the edited formula raises.
         """
         home = next((f for f in self._functions.values() if f.start <= edit.start and edit.end <= f.end), None)
         if home is None or self._main is None:
-            raise LookupError("outside of functions")
+            raise OutsideError
         changed = _Changed(self, home, edit)
         self._patched(changed.wrapper)
         try:
