@@ -328,17 +328,17 @@ def test_apply_writes_a_copy_that_is_right_and_never_the_file_itself(
 
 
 def test_an_iteration_that_does_not_converge_is_said_first(repository: Path, tmp_path: Path) -> None:
-    home = repository / "benchmarks" / "rrr"
+    home = repository / "examples" / "rrr"
     text = (home / "rrr.py").read_text(encoding="utf-8")
     path = tmp_path / "rrr.py"
-    path.write_text(text.replace("- p.l2**2", "+ p.l2**2"), encoding="utf-8")
-    found = diagnosed(home / "rrr.toml", path)
+    path.write_text(text.replace("- p.l2**2)", "+ p.l2**2)"), encoding="utf-8")
+    found = diagnosed(home / "rrr.toml", path, "exact")
     first = found.findings[0]
     assert first.kind == "kinematics"
     assert "does not converge" in " ".join([first.sentence, *found.not_covered])
     assert ("weight", "q1") in wrong_entries(found)
     path.write_text(text, encoding="utf-8")
-    assert diagnosed(home / "rrr.toml", path).right
+    assert diagnosed(home / "rrr.toml", path, "exact").right
 
 
 def test_a_wrong_mass_is_named_through_single_precision(repository: Path, tmp_path: Path) -> None:

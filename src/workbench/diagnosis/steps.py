@@ -169,14 +169,16 @@ def _written(statement: ast.stmt) -> frozenset[str]:
 def _mutated(statement: ast.stmt) -> frozenset[str]:
     found: set[str] = set()
     for node in ast.walk(statement):
-        if isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
-            found.add(node.target.id)
-        elif isinstance(node, ast.Subscript | ast.Attribute) and isinstance(node.ctx, ast.Store):
-            found |= _loads(node.value)
-        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
-            found |= _loads(node.value)
-        elif isinstance(node, ast.keyword) and node.arg == "out":
-            found |= _loads(node.value)
+        match node:
+            case ast.AugAssign(target=ast.Name(id=name)):
+                found.add(name)
+            case (
+                ast.Subscript(value=value, ctx=ast.Store())
+                | ast.Attribute(value=value, ctx=ast.Store())
+                | ast.Expr(value=ast.Call() as value)
+                | ast.keyword(arg="out", value=value)
+            ):
+                found |= _loads(value)
     return frozenset(found)
 
 
