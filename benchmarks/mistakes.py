@@ -20,6 +20,7 @@ import json
 import random
 import tempfile
 import time
+import warnings
 from collections import Counter, defaultdict
 from pathlib import Path
 from types import SimpleNamespace
@@ -269,20 +270,16 @@ def judged(bench: Bench, subject, truth, text: str, lines: list[int], mend: bool
     }
     if mend:
         begun = time.process_time()
-        found, _ = search.search_mends(subject, seen, limit)
+        found, notes = search.search_mends(subject, seen, limit)
         row["seconds_search"] = round(time.process_time() - begun, 2)
         want = bench.text.splitlines()
         steps = sorted({s.step for s in found})
-        got = 0
-        for line in lines:
-            for step in steps:
-                alike = [s for s in found if s.step == step][:3]
-                if any(s.line == line and _same(s.after, want[line - 1]) for s in alike):
-                    got += 1
-                    break
-        row["undone"] = got == len(lines)
+        first = [s for step in steps for s in [s for s in found if s.step == step][:3]]
+        row["complete"] = bool(found) and found[-1].left == 0 and not any("a part of it" in note for note in notes)
+        row["undone"] = all(any(s.line == n and _same(s.after, want[n - 1]) for s in first) for n in lines)
+        # the original line, or one that computes the same on all robots and at all poses looked at
+        row["mended"] = row["undone"] or (row["complete"] and all(any(s.line == n for s in first) for n in lines))
         row["undoable"] = all(bench.undoable(text, line, want[line - 1], seen) for line in lines)
-        row["complete"] = bool(found) and found[-1].left == 0
         row["mends"] = [f"{s.step}: {s.diff}" for s in found]
     return row
 
@@ -309,6 +306,7 @@ def main() -> None:
     search.Supervisor = InProcess
     search.time = SimpleNamespace(monotonic=time.process_time)  # other processes do not shorten a search
     warm()
+    warnings.filterwarnings("ignore", category=RuntimeWarning)
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -322,7 +320,7 @@ def main() -> None:
             row |= judged(bench, subject, truth, text, lines, options.search, options.limit)
             rows.append(row)
             print(number, robot, kinds, {k: v for k, v in row.items() if isinstance(v, bool)}, flush=True)
-            if not all(v for k, v in row.items() if isinstance(v, bool) and k != "undoable"):
+            if not all(v for k, v in row.items() if isinstance(v, bool) and k not in ("undoable", "undone")):
                 was, now = bench.text.splitlines(), text.splitlines()
                 row["planted"] = [(now[line - 1].strip(), was[line - 1].strip()) for line in lines]
                 print("   ", row["planted"], row["findings"], row.get("mends"), flush=True)
@@ -334,10 +332,10 @@ def main() -> None:
 
 def summary(rows: list[dict]) -> None:
     """Print figures by kind of mistake, by formula, and the misses."""
-    keys = [k for k in ("noticed", "joint_and_part", "parameter", "complete", "undone") if k in rows[0]]
+    keys = [k for k in ("noticed", "joint_and_part", "parameter", "complete", "mended", "undone") if k in rows[0]]
     kinds = Counter(kind for row in rows for kind in row["kinds"])
     robots = Counter(row["robot"] for row in rows)
-    print(f"{'kind':30} {'n':>4} " + " ".join(f"{key:>15}" for key in keys) + "   undone of undoable")
+    print(f"{'kind':30} {'n':>4} " + " ".join(f"{key:>15}" for key in keys) + "   mended of undoable")
     for kind in [*kinds, *robots, "all"]:
         mine = [row for row in rows if kind in ("all", row["robot"]) or kind in row["kinds"]]
         shares = [100 * sum(row[key] for row in mine) / len(mine) for key in keys]
@@ -345,7 +343,7 @@ def summary(rows: list[dict]) -> None:
         print(
             f"{kind:30} {len(mine):4} "
             + " ".join(f"{share:13.1f} %" for share in shares)
-            + (f"   {sum(row['undone'] for row in could)} of {len(could)}" if could else "")
+            + (f"   {sum(row['mended'] for row in could)} of {len(could)}" if could else "")
         )
     for key in ("seconds_findings", "seconds_search"):
         if key in rows[0]:

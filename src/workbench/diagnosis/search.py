@@ -18,12 +18,13 @@ import numpy as np
 from workbench.diagnosis.combine import groups_alike, masks, sums
 from workbench.diagnosis.edits import LIKELY, STAGES, Edit, edits_of
 from workbench.diagnosis.examine import Examined
+from workbench.diagnosis.inserts import inserts_of
 from workbench.diagnosis.nodes import Node, distinct, shifted
 from workbench.diagnosis.paper import groups_of, lines_run, make_paper, missing_in
 from workbench.diagnosis.result import Suggestion
 from workbench.diagnosis.subject import Subject
 from workbench.diagnosis.suggestions import suggested
-from workbench.diagnosis.trial import FIRST, Paper, Score, Setup, Task
+from workbench.diagnosis.trial import FIRST, NOTHING, Paper, Score, Setup, Task, nothing_right
 from workbench.errors import WorkbenchError
 from workbench.sweep.supervisor import Lost, Supervisor
 
@@ -33,6 +34,8 @@ FULL = 40
 
 WHOLE = 400
 """The same, of edits after which the robot as it is is right."""
+
+MOST_INSERTS = 8000
 
 STEPS = 6
 BATCH = 24
@@ -84,12 +87,11 @@ class _Search:
         self.tried = 0
 
     def run(self, text: str, path: str) -> tuple[list[Suggestion], tuple[str, ...]]:
-        started = self.scores([text], FIRST)[0]
-        if started is None:
-            return [], ("No edits are looked for: the file does not run in a worker.",)
-        root = Node(text, started)
-        self._fill([root])
-        best = self._followed(root) if root.whole is not None else root
+        started, whole = self.scores([text], FIRST)[0], self.scores([text], None)[0]
+        if started is None or whole is None:  # it fails at all of these states; an edit may mend that
+            started, whole = (nothing_right(self._paper, count) for count in (1, len(self._paper.exams)))
+        root = Node(text, started, whole=whole)
+        best = self._followed(root)
         notes = [f"{self.tried} edits tried."]
         if time.monotonic() > self._deadline:
             notes.append("The time was up before all were; --time SECONDS gives more.")
@@ -103,15 +105,20 @@ class _Search:
 
     def _followed(self, root: Node) -> Node:
         """The best source that is found in time."""
-        best, better, worse = root, [root], list[Node]()
+        best, better, worse, filled = root, [root], list[Node](), set[str]()
         seen = {root.text}
         while (better or worse) and not best.complete and time.monotonic() < self._deadline:
             # the best source first; one that led nowhere gives way to the next best, at last to the least wrong
             climbing = bool(better)
-            node = better.pop(0) if climbing else worse.pop(0)
-            if node.whole is None:
-                self._fill([node])
-            found = self._expand(node, climbing)
+            if not climbing and best.text not in filled and best.text in self._looked:
+                node, climbing = best, True
+                filled.add(best.text)
+                found = self._inserted(best)
+            else:
+                node = better.pop(0) if climbing else worse.pop(0)
+                if node.whole is None:
+                    self._fill([node])
+                found = self._expand(node, climbing)
             if found and _rank(found[0]) > _rank(best):
                 best = found[0]
             if len(node.chain) + 1 >= STEPS:
@@ -150,6 +157,29 @@ class _Search:
         looked = sorted(looked, key=lambda n: n.look.key, reverse=True)
         self._fill([n for n in looked if thorough or n.look.key > node.look.key][:FULL])
         return sorted((n for n in looked if n.whole is not None), key=_rank, reverse=True)
+
+    def _inserted(self, node: Node) -> list[Node]:
+        """The same of terms and factors put into the statements whose edits move what is wrong."""
+        looked: list[Node] = []
+        for line in self._suspects(node):
+            stage = self._look(node, inserts_of(node.text, line))
+            looked += stage
+            right = [n for n in stage if n.look.base.all()]
+            self._fill(right[:FULL])
+            if any(n.complete for n in right) or len(looked) > MOST_INSERTS:
+                break
+        self._looked[node.text] += looked
+        self._fill(sorted((n for n in looked if n.look.key > node.look.key), key=_rank, reverse=True)[:FULL])
+        return sorted((n for n in looked if n.whole is not None), key=_rank, reverse=True)
+
+    def _suspects(self, node: Node) -> list[int]:
+        """Lines whose edits together move all that is wrong, those that move least of what is right first."""
+        wrong, moves = ~node.look.base, dict[int, np.ndarray]()
+        for looked in self._looked[node.text]:
+            moved = ~(np.abs(looked.look.found - node.look.found).max(axis=1) <= NOTHING * self._paper.floors)
+            moves[looked.edit.line] = moves.get(looked.edit.line, False) | moved
+        lines = [line for line, moved in moves.items() if not (wrong & ~moved).any()]
+        return sorted(lines, key=lambda line: (int((moves[line] & ~wrong).sum()), line))
 
     def _telling(self, node: Node, nodes: list[Node]) -> list[Node]:
         """Those that are right in the exam, too, that the source before is most wrong in."""

@@ -225,6 +225,12 @@ def judged(paper: Paper, answers: Sequence[FloatArray], exams: Sequence[Exam]) -
     return Score(right, total, base, mask, moved, complete, _behind(paper, first), first, len(answers))
 
 
+def nothing_right(paper: Paper, exams: int) -> Score:
+    """Score of a formula that does not answer."""
+    nothing = [np.full_like(exam.parts, np.nan) for exam in paper.exams[:exams]]
+    return judged(paper, nothing, paper.exams[:exams])
+
+
 def _behind(paper: Paper, found: FloatArray) -> int:
     """Count the numbers behind the entries that are right."""
     jacobian = paper.jacobian
