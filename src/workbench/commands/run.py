@@ -57,7 +57,7 @@ def run(
         bool,
         typer.Option(
             "--replace",
-            help="Replace an earlier run of another robot, of other cases or candidates, once this is done.",
+            help="Replace an earlier run of another robot, other cases or candidates, or of more evidence.",
         ),
     ] = False,
     jobs: Annotated[int | None, typer.Option(min=1, help="Workers of a sweep. Default: one per core.")] = None,
@@ -98,7 +98,7 @@ def run(
     if relative and (sweep or dry_run):
         raise SpecError(f"{campaign}: --set NAME*=FACTOR does not go with {'--dry-run' if dry_run else 'a sweep'}")
     if dry_run:
-        print_dry_run(spec, file, model, values, effort, jobs, candidates or (), only or ())
+        print_dry_run(spec, file, model, values, effort, jobs, candidates or (), only or (), keep_going)
         return
     if sweep:
         try:

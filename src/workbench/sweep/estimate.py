@@ -12,6 +12,7 @@ import numpy as np
 from workbench.campaign.cases import base_robot, resolve_cases
 from workbench.campaign.compare import compute_case
 from workbench.campaign.evidence import Effort
+from workbench.campaign.not_driven import NotDriven, refuse_none
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate, full_names, load_candidates, with_rows
 from workbench.sweep.evaluate import Context, evaluate, series_bytes
@@ -43,6 +44,8 @@ class Estimate:
     tried: int = 0
     tried_filtered: int = 0
     tried_failed: int = 0
+    left_out: tuple[str, ...] = ()
+    """of cases that cannot be driven and that a run would go on past, the line that each would end it with"""
 
 
 def estimate(
@@ -54,10 +57,12 @@ def estimate(
     jobs: int | None,
     candidates: Sequence[str | Path] = (),
     only: Sequence[str] = (),
+    keep_going: bool = False,
 ) -> Estimate:
     """Estimate a campaign; everything in it is resolved and checked as for a run, and nothing is written.
 
-    *only* names the cases that would be run, of a sweep too; none is all.
+    *only* names the cases that would be run, of a sweep too; none is all. With *keep_going* cases that cannot be driven
+    are told, and the others estimated.
 
     Raises
     ------
@@ -70,7 +75,7 @@ def estimate(
     if campaign.sweep is not None and only:
         campaign = pick_cases(campaign, file, model, settings, only, users)
     if campaign.sweep is None:
-        return _of_cases(campaign, file, model, settings, effort, users, only)
+        return _of_cases(campaign, file, model, settings, effort, users, only, keep_going)
     effort = Effort.of_many(effort.engines, campaign.sweep.budget)
     plan = plan_sweep(campaign, file, model, settings, users)
     common = common_key(campaign, file, plan.model, settings, effort, campaign.sweep.keep_series, users)
@@ -122,12 +127,17 @@ def _of_cases(
     effort: Effort,
     users: Sequence[UserCandidate],
     only: Sequence[str],
+    keep_going: bool,
 ) -> Estimate:
-    cases = resolve_cases(campaign, file, model, tuple(only), settings, (), users)
+    missing: list[NotDriven] = []
+    left_out = missing.append if keep_going else None
+    cases = resolve_cases(campaign, file, model, tuple(only), settings, (), users, left_out)
+    refuse_none(cases, missing)
     samples = sum(len(case.motion.t) for case in cases)
     short = min(cases, key=lambda case: len(case.motion.t))
     begun = time.perf_counter()
     result = compute_case(campaign, short, effort)
     seconds = (time.perf_counter() - begun) * len(cases)
     size = len(series_bytes(result)) * samples / len(short.motion.t)
-    return Estimate(len(cases), samples, seconds, 1, size, size, tried=1)
+    told = tuple(str(one.error) for one in missing)
+    return Estimate(len(cases), samples, seconds, 1, size, size, tried=1, left_out=told)
