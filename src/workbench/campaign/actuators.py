@@ -14,7 +14,6 @@ from typing import Any, Protocol
 
 from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case
-from workbench.campaign.changed import not_known
 from workbench.campaign.spec import Campaign
 from workbench.capabilities.robot import Robot
 from workbench.demand import demand_of
@@ -166,12 +165,12 @@ def shortfalls(found: Sequence[Margin]) -> list[str]:
     return said
 
 
-def answer(found: Sequence[Margin], unknown: Sequence[str] = ()) -> str:
+def answer(found: Sequence[Margin], besides: str = "") -> str:
     """Whether the actuators are big enough, in a sentence; empty where nobody gave limits.
 
-    *unknown* names the cases that were not computed.
+    *besides* says of which cases nothing is said.
     """
-    return f"{_answer(found)}{not_known(unknown)}" if found else ""
+    return f"{_answer(found)}{besides}" if found else ""
 
 
 def _answer(found: Sequence[Margin]) -> str:
