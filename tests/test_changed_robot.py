@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from small_campaign import Workbench
-from workbench.campaign.actuators import margins_of_facts, shortfalls
+from workbench.campaign.margins import margins_of_facts, shortfalls
 from workbench.robots.actuators import ActuatorSpec
 
 

@@ -15,7 +15,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from workbench.campaign.actuators import answer, shortfalls
 from workbench.campaign.changed import ANOTHER, Change, not_known, sentences
 from workbench.campaign.compare import Row
 from workbench.campaign.conclusion import (
@@ -28,6 +27,7 @@ from workbench.campaign.conclusion import (
 )
 from workbench.campaign.good import NO, WORDS, YES, answers, good_enough
 from workbench.campaign.good import UNDECIDED as UNDECIDED_ANSWER
+from workbench.campaign.margins import answer, shortfalls
 from workbench.campaign.not_driven import NOT_DRIVEN
 from workbench.campaign.run import Outcome
 from workbench.campaign.verdict import (

@@ -7,14 +7,12 @@ nothing: no verdict and no exit code depend on it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
 from workbench.campaign.changed import few
-from workbench.campaign.spec import Campaign, check_fraction
 from workbench.campaign.verdict import SHARE, WITHOUT_BOUND
-from workbench.errors import SpecError
 
 YES, NO, UNDECIDED = "yes", "no", "undecided"
 WORDS = {YES: "good enough", NO: "NOT good enough", UNDECIDED: "good enough? undecided"}
@@ -114,48 +112,3 @@ def answers(rows: Iterable[Measured], good: float | None, besides: str = "") -> 
         if good_enough(row, good):
             groups.setdefault((row.candidate, row.reference), []).append(row)
     return [Answer(*names, good, tuple(found), besides) for names, found in groups.items()]
-
-
-def with_good(campaign: Campaign, good: float | None) -> Campaign:
-    """Return the campaign with another wanted accuracy; None leaves its own.
-
-    Raises
-    ------
-    SpecError
-        No fraction between 0 and 1.
-    """
-    refuse_no_fraction(good)
-    return campaign if good is None else campaign.model_copy(update={"good": good})
-
-
-def refuse_no_fraction(good: float | None) -> None:
-    """Refuse a wanted accuracy of the command line that is no fraction; None is nothing wanted.
-
-    Raises
-    ------
-    SpecError
-        No number between 0 and 1.
-    """
-    if good is not None:
-        try:
-            check_fraction(good)
-        except ValueError as error:
-            raise SpecError(f"--good {good:g}: {error}", key="good", value=good) from error
-
-
-def check_asked(campaign: Campaign, where: str) -> None:
-    """Refuse a wanted accuracy that nothing is held against.
-
-    Raises
-    ------
-    SpecError
-        Every formula has a bound, or there is none.
-    """
-    asked: Sequence[str] = [one.name for one in campaign.candidate if one.bound is None]
-    if campaign.good is not None and not asked:
-        raise SpecError(
-            f"{where}: good = {campaign.good:g}: no formula without a bound, so nothing is held against it; a"
-            " [[candidate]] without bound is measured",
-            key="good",
-            value=campaign.good,
-        )

@@ -48,7 +48,7 @@ def compare(
     """
     from rich.text import Text
 
-    from workbench.campaign.good import refuse_no_fraction
+    from workbench.campaign.asked import refuse_no_fraction
     from workbench.commands.before import run_before
     from workbench.commands.change_table import LEGEND, change_table
     from workbench.compare.outcome import NOTHING, WORSE, outcome_of

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from workbench.campaign.actuators import answer, shortfalls
 from workbench.campaign.changed import few, not_shared
 from workbench.campaign.good import YES
+from workbench.campaign.margins import answer, shortfalls
 from workbench.compare.errors import FACTOR, FLOOR, all_worse
 from workbench.compare.runs import RunComparison
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from workbench.campaign.actuators import Margin
 from workbench.campaign.changed import few, not_shared
 from workbench.campaign.good import Answer, answers
+from workbench.campaign.margins import Margin
 from workbench.compare.asked import Asked, demands, margins_of_both, reactions, shared_cases
 from workbench.compare.errors import ErrorChange, match_errors
 from workbench.compare.parameters import parameter_changes

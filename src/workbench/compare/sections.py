@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from workbench.campaign.actuators import answer, worst_of
 from workbench.campaign.changed import not_shared
+from workbench.campaign.margins import answer, worst_of
 from workbench.campaign.verdict import WITHOUT_BOUND
 from workbench.compare.asked import WORDS, Asked, shared_cases, worst_over_cases
 from workbench.compare.errors import FLOOR, ErrorChange, growth, growth_text

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from workbench.campaign.actuators import Margin, margins, shortfalls
 from workbench.campaign.changed import not_known
 from workbench.campaign.good import YES, answers
+from workbench.campaign.margins import Margin, margins, shortfalls
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
 from workbench.report.tables import NOT_COMPUTED
