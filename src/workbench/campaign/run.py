@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.campaign import store
-from workbench.campaign.actuators import Margin, limits_of, margins_of_facts
+from workbench.campaign.actuators import limits_of
+from workbench.campaign.asked import check_asked, with_good
 from workbench.campaign.cases import Case, resolve_cases, with_unit_hint
 from workbench.campaign.changes import IN_CAMPAIGN, Changes, Variant, changes_of
 from workbench.campaign.claims import judge_claims
@@ -21,9 +22,9 @@ from workbench.campaign.conclusion import CaseOutcome, Conclusion, case_status, 
 from workbench.campaign.cost import cost_us
 from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.figure_spec import FigureSpec
-from workbench.campaign.good import check_asked, with_good
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
+from workbench.campaign.margins import Margin, margins_of_facts
 from workbench.campaign.not_driven import NotDriven, refuse_none
 from workbench.campaign.replacing import refuse_loss, request_of
 from workbench.campaign.spec import Campaign, load_campaign

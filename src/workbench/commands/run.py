@@ -86,8 +86,8 @@ def run(
     Exit code 0: every bound holds; 1: a bound fails or cannot be decided, or a case could not be computed; 2: bad
     input; 4: nothing was held against a bound, so nothing is judged.
     """
+    from workbench.campaign.asked import with_good
     from workbench.campaign.evidence import Effort
-    from workbench.campaign.good import with_good
     from workbench.campaign.run import run_campaign
     from workbench.campaign.spec import campaign_names, load_campaign
     from workbench.commands.sweeps import dry_run as print_dry_run

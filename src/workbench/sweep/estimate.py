@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from workbench.campaign.actuators import limits_of
+from workbench.campaign.asked import check_asked
 from workbench.campaign.cases import base_robot, resolve_cases
 from workbench.campaign.compare import compute_case
 from workbench.campaign.evidence import Effort
-from workbench.campaign.good import check_asked
 from workbench.campaign.not_driven import NotDriven, refuse_none
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate, full_names, load_candidates, with_rows
