@@ -46,19 +46,19 @@ def make_paper(subject: Subject, seen: Examined) -> Paper:
             continue
     return Paper(
         str(source.file), source.candidate, subject.takes_force, splitting, seen.floors, tuple(exams),
-        _parts(splitting, start), _jacobian(subject, plan), forces, SAFETY * seen.noise,
+        _parts(splitting, start), _pulled(subject, plan), forces, SAFETY * seen.noise,
     )  # fmt: skip
 
 
-def _jacobian(subject: Subject, plan: Plan) -> FloatArray | None:
-    """The reference's J at the poses, from its response to forces; None where it cannot be inverted."""
+def _pulled(subject: Subject, plan: Plan) -> FloatArray | None:
+    """The inverse of J^T at the poses, from the reference's response to forces; None where there is none."""
     q, zero = plan.poses, np.zeros_like(plan.poses)
     rest = subject.torques_of_reference(q, zero, zero, np.zeros((len(q), 3)), {})
     rows = [rest - subject.torques_of_reference(q, zero, zero, np.zeros((len(q), 3)) + axis, {}) for axis in np.eye(3)]
     found = np.stack(rows, axis=1)
     if found.shape[2] != 3 or not np.isfinite(found).all() or np.linalg.cond(found).max() > SINGULAR:
         return None
-    return found
+    return np.asarray(np.linalg.inv(found.swapaxes(1, 2)))
 
 
 def _parts(splitting: FloatArray, tau: FloatArray) -> FloatArray:

@@ -105,27 +105,27 @@ class _Search:
 
     def _followed(self, root: Node) -> Node:
         """The best source that is found in time."""
-        best, better, worse, filled = root, [root], list[Node](), set[str]()
+        best, better, worse, filled = root, [root], list[Node](), list[Node]()
         seen = {root.text}
         while (better or worse) and not best.complete and time.monotonic() < self._deadline:
             # the best source first; one that led nowhere gives way to the next best, at last to the least wrong
             climbing = bool(better)
-            if not climbing and best.text not in filled and best.text in self._looked:
-                node, climbing = best, True
-                filled.add(best.text)
-                found = self._inserted(best)
+            if not climbing and filled:
+                node, climbing = filled.pop(0), True
+                found = self._inserted(node)
             else:
                 node = better.pop(0) if climbing else worse.pop(0)
                 if node.whole is None:
                     self._fill([node])
                 found = self._expand(node, climbing)
+                if node is root or (climbing and node is best):
+                    filled.append(node)
             if found and _rank(found[0]) > _rank(best):
                 best = found[0]
             if len(node.chain) + 1 >= STEPS:
                 continue
-            gain = [n for n in distinct(found) if n.text not in seen and _key(n) > _key(node if climbing else root)][
-                :BEAM
-            ]
+            before = _key(node if climbing else root)[0]
+            gain = [n for n in distinct(found) if n.text not in seen and _key(n)[0] > before][:BEAM]
             seen |= {n.text for n in gain}
             better = sorted([*better, *gain], key=_rank, reverse=True)
             if node is root:
@@ -155,7 +155,7 @@ class _Search:
         else:
             looked = [*looked, *self._combined(node, looked)]
         looked = sorted(looked, key=lambda n: n.look.key, reverse=True)
-        self._fill([n for n in looked if thorough or n.look.key > node.look.key][:FULL])
+        self._fill([n for n in looked if thorough or n.look.key[0] > node.look.key[0]][:FULL])
         return sorted((n for n in looked if n.whole is not None), key=_rank, reverse=True)
 
     def _inserted(self, node: Node) -> list[Node]:

@@ -61,8 +61,9 @@ class Paper:
     """the robot as it is first, then with parameters changed one by one"""
     start: FloatArray
     """``(parts, poses, na)`` of the first exam by the formula as it is"""
-    jacobian: FloatArray | None
-    """``(poses, 3, na)`` the reference's, where it is square and regular: errors are looked at per direction, too"""
+    pulled: FloatArray | None
+    """``(poses, 3, na)`` torques to forces at the platform, the inverse of J^T, where it is regular: errors are looked
+    at per direction, too"""
     forces: int | None
     """where among the parts the responses to the three components of the force begin"""
     noise: float
@@ -233,14 +234,11 @@ def nothing_right(paper: Paper, exams: int) -> Score:
 
 def _behind(paper: Paper, found: FloatArray) -> int:
     """Count the numbers behind the entries that are right."""
-    jacobian = paper.jacobian
-    if jacobian is None or not np.isfinite(found).all():
+    if paper.pulled is None or not np.isfinite(found).all():
         return 0
-    inverse, wanted = np.linalg.inv(jacobian), paper.exams[0].parts
-    pushed = np.einsum(
-        "saj,psj->psa", inverse.swapaxes(1, 2), np.stack([found - wanted, wanted]).reshape(-1, *found.shape[1:])
-    )
-    gap, size = np.abs(pushed).max(axis=1).reshape(2, found.shape[0], -1)
+    wanted = paper.exams[0].parts
+    pushed = np.einsum("saj,qpsj->qpsa", paper.pulled, np.stack([found - wanted, wanted]))
+    gap, size = np.abs(pushed).max(axis=2)
     right = int((gap <= RIGHT * np.maximum(size, 1e-3 * size.max())).sum())
     if paper.forces is None:
         return right
