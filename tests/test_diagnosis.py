@@ -6,13 +6,16 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import workbench as wb
 from small_campaign import Workbench
+from workbench.diagnosis.edits import Edit
 from workbench.diagnosis.entries import WRONG_MARK, Entry, floors_of, ratio_of, simple
 from workbench.diagnosis.examine import diagnose_subject
 from workbench.diagnosis.paper import lines_run, make_paper, splitting_of
@@ -21,7 +24,7 @@ from workbench.diagnosis.probes import ask, choose_poses, make_plan
 from workbench.diagnosis.result import Diagnosis
 from workbench.diagnosis.search import search_mends
 from workbench.diagnosis.surface import subjects, write_mended
-from workbench.diagnosis.trial import FIRST, Setup, Task, code_of
+from workbench.diagnosis.trial import FIRST, Looks, Setup, Task, code_of
 
 EXAMPLES = ("delta", "fourbar", "fivebar", "bricard", "orthoglide")
 
@@ -227,6 +230,24 @@ def test_an_edit_that_mends_everything_scores_complete(repository: Path, tmp_pat
     lines = lines_run(subject, seen.plan)
     assert lines is not None
     assert len(lines) > 20
+
+
+def test_edits_are_looked_at_as_files_where_two_names_share_one_array(repository: Path, tmp_path: Path) -> None:
+    """Statement by statement, with copies, such a formula gives something else: that is noticed, and not used."""
+    old = "    return arm + (tangent * at_elbow)"
+    campaign, path = spoiled(repository, tmp_path, "delta", old, "    same = arm\n    same *= 0.5\n" + old)
+    subject = subjects(campaign, candidates=[path], candidate="exact")[0]
+    _, seen = diagnose_subject(subject)
+    paper, text = make_paper(subject, seen), path.read_text()
+    exam = replace(paper.exams[0], values=SimpleNamespace(**vars(subject.values({}))))
+    looks = Looks(replace(paper, exams=(exam,)))
+    assert looks.recorded(text) is None
+    place = text.index("0.5")
+    found = looks.score(text, Edit(place, place + 3, "1.0", 0, 1))
+    assert found is not None
+    assert found.base.all()
+    plain = looks.recorded((repository / "examples" / "delta" / "delta.py").read_text())
+    assert plain is not None
 
 
 @pytest.mark.long

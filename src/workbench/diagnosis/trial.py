@@ -304,7 +304,7 @@ class Looks:
         if text not in self._tapes:
             if len(self._tapes) >= MOST_TAPES:
                 self._tapes.pop(next(iter(self._tapes)))
-            self._tapes[text] = self._recorded(text)
+            self._tapes[text] = self.recorded(text)
         tape = self._tapes[text]
         if tape is None:
             return score(self._paper, edit.apply(text), FIRST)
@@ -325,7 +325,7 @@ class Looks:
 
         return bounded(call, ONE_EDIT_S)
 
-    def _recorded(self, text: str) -> Tape | None:
+    def recorded(self, text: str) -> Tape | None:
         """The text's run; None where going through it statement by statement does not give just what it gives."""
         paper = self._paper
         kept = [array.copy() for array in self._given]
