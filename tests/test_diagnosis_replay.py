@@ -24,7 +24,7 @@ SCALE = 2.0
 
 
 def weigh(p, q):
-    heavy = q * p
+    heavy = np.array(q * p)
     heavy[:, 0] += 1.0
     return heavy.sum(axis=1)
 
@@ -32,7 +32,7 @@ def weigh(p, q):
 def twice(p, q):
     first = weigh(p, q)
     second = weigh(p, 2 * q)
-    kept = first + 0.0
+    kept = np.array(first)
     kept += 1.0
     return first * second * kept
 
@@ -43,7 +43,7 @@ def formula(p, q, qd):
         total = total + k * q[:, k]
     rows = [total]
     rows.append(weigh(p, qd))
-    out = 1.0 * total
+    out = np.array(total)
     out -= twice(p, q)
     if p > 1:
         more = (lambda x: x + p)(qd[:, 0])
