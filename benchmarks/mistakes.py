@@ -306,7 +306,7 @@ def main() -> None:
     search.Supervisor = InProcess
     search.time = SimpleNamespace(monotonic=time.process_time)  # other processes do not shorten a search
     warm()
-    warnings.filterwarnings("ignore", category=RuntimeWarning)
+    warnings.simplefilter("ignore")
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

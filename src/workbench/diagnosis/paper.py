@@ -13,7 +13,7 @@ from workbench.arrays import FloatArray
 from workbench.diagnosis.examine import Examined
 from workbench.diagnosis.noise import SAFETY
 from workbench.diagnosis.parts import REST, Part, design, take_apart
-from workbench.diagnosis.probes import Plan, ask
+from workbench.diagnosis.probes import Plan
 from workbench.diagnosis.shares import reference_torques
 from workbench.diagnosis.subject import AFFINE, Parameter, Subject
 from workbench.diagnosis.trial import Exam, Paper
@@ -31,7 +31,6 @@ def make_paper(subject: Subject, seen: Examined) -> Paper:
     assert source is not None
     plan = seen.plan.at(POSES)
     splitting = splitting_of(plan, subject.takes_force)
-    start, _ = ask(plan, lambda q, qd, qdd, force: subject.formula(q, qd, qdd, force, {}))
     exams = [Exam(subject.values({}), plan.flat(), _parts(splitting, reference_torques(subject, plan, {})))]
     mixed = sum(label[0] == "mixed" for label in plan.labels)
     forces = len(splitting) - mixed - 3 if subject.takes_force else None
@@ -46,7 +45,7 @@ def make_paper(subject: Subject, seen: Examined) -> Paper:
             continue
     return Paper(
         str(source.file), source.candidate, subject.takes_force, splitting, seen.floors, tuple(exams),
-        _parts(splitting, start), _pulled(subject, plan), forces, SAFETY * seen.noise,
+        _pulled(subject, plan), forces, SAFETY * seen.noise,
     )  # fmt: skip
 
 

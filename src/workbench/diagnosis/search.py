@@ -76,12 +76,16 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+Place = tuple[int, int, int, str]
+"""Of an edit, whatever other lines look like."""
+
+
 class _Search:
     def __init__(
         self, supervisor: Supervisor, paper: Paper, deadline: float, edits: Callable[[str], list[Edit]]
     ) -> None:
         self._supervisor, self._paper, self._deadline, self._edits = supervisor, paper, deadline, edits
-        self._moves: dict[tuple[int, int, int, str], np.ndarray] = {}
+        self._breaks: dict[str, dict[Place, np.ndarray]] = {}
         self._looked: dict[str, list[Node]] = {}
         self._run: set[str] = set()
         self.tried = 0
@@ -112,7 +116,7 @@ class _Search:
             climbing = bool(better)
             if not climbing and filled:
                 node, climbing = filled.pop(0), True
-                found = self._inserted(node)
+                found = [n for n in self._inserted(node) if _key(n) > _key(best)]
             else:
                 node = better.pop(0) if climbing else worse.pop(0)
                 if node.whole is None:
@@ -136,14 +140,13 @@ class _Search:
     def _expand(self, node: Node, thorough: bool) -> list[Node]:
         """Look at all edits of a source, and at the promising ones on all exams; best first."""
         made: dict[str, Edit] = {}
-        wrong = ~node.look.base
+        before = [self._breaks.get(text, {}) for _, text in node.chain]
         for edit in self._edits(node.text):
             place = edit.place(node.text)
-            moves = self._moves.get(place)
-            # a mend moves nothing that is right; what an edit moves was seen when it was tried first
-            if node.chain and moves is not None and place[0] not in node.lines and (moves & ~wrong).any():
-                continue
-            made.setdefault(edit.apply(node.text), edit)
+            # what was right, was broken by the edit when it was tried there, and is right still, would be broken again
+            seen = (breaks[place] for breaks in before if place in breaks) if place[0] not in node.lines else ()
+            if not any((broken & node.look.base).any() for broken in seen):
+                made.setdefault(edit.apply(node.text), edit)
         looked = self._looked[node.text] = []
         for kinds in STAGES if thorough else (LIKELY,):
             stage = self._look(node, [edit for edit in made.values() if edit.kind in kinds])
@@ -253,15 +256,14 @@ class _Search:
         return moved
 
     def _look(self, node: Node, edits: list[Edit]) -> list[Node]:
-        found = []
+        found, broken = [], self._breaks.setdefault(node.text, {})
         batches = [tuple(edits[first : first + BATCH]) for first in range(0, len(edits), BATCH)]
         answers = self._asked([Task((node.text,), FIRST, batch) for batch in batches])
         for batch, answer in zip(batches, answers, strict=True):
             for edit, score in zip(batch, answer or [None] * len(batch), strict=True):
                 if score is not None:
                     found.append(node.after(edit, score))
-                    if not node.chain:
-                        self._moves[edit.place(node.text)] = score.moved
+                    broken[edit.place(node.text)] = node.look.base & ~score.base
         return found
 
     def _fill(self, nodes: Sequence[Node]) -> None:

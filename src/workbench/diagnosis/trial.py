@@ -59,8 +59,6 @@ class Paper:
     """``(na,)`` the joints' largest parts"""
     exams: tuple[Exam, ...]
     """the robot as it is first, then with parameters changed one by one"""
-    start: FloatArray
-    """``(parts, poses, na)`` of the first exam by the formula as it is"""
     pulled: FloatArray | None
     """``(poses, 3, na)`` torques to forces at the platform, the inverse of J^T, where it is regular: errors are looked
     at per direction, too"""
@@ -82,8 +80,6 @@ class Score:
     """``(parts, na)`` which entries are right for the robot as it is"""
     mask: np.ndarray
     """the same for all exams in a row"""
-    moved: np.ndarray
-    """``(parts, na)`` which are other than the unedited formula's"""
     complete: bool
     """all of them, in all exams"""
     behind: int
@@ -221,9 +217,8 @@ def judged(paper: Paper, answers: Sequence[FloatArray], exams: Sequence[Exam]) -
         total -= float(logs.sum())
         complete = complete and bool(good.all())
     base = masks[0].reshape(first.shape[0], -1)
-    moved = ~(np.abs(first - paper.start).max(axis=1) <= NOTHING * paper.floors)
     mask = np.concatenate(masks)
-    return Score(right, total, base, mask, moved, complete, _behind(paper, first), first, len(answers))
+    return Score(right, total, base, mask, complete, _behind(paper, first), first, len(answers))
 
 
 def nothing_right(paper: Paper, exams: int) -> Score:
