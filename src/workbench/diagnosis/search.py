@@ -35,7 +35,7 @@ FULL = 40
 WHOLE = 400
 """The same, of edits after which the robot as it is is right."""
 
-MOST_INSERTS = 8000
+MOST_INSERTS = 6000
 
 STEPS = 6
 BATCH = 24
@@ -115,7 +115,7 @@ class _Search:
             # the best source first; one that led nowhere gives way to the next best, at last to the least wrong
             climbing = bool(better)
             if not climbing and filled:
-                node, climbing = filled.pop(0), True
+                node, climbing = filled.pop(), True
                 found = [n for n in self._inserted(node) if _key(n) > _key(best)]
             else:
                 node = better.pop(0) if climbing else worse.pop(0)
