@@ -20,6 +20,8 @@ class Node:
     """edits so far, each with the text that it was made on"""
     whole: Score | None = field(default=None)
     """on all exams, where it was looked at"""
+    broken: int = 0
+    """numbers of those that were right at the start and are no longer"""
 
     @property
     def edit(self) -> Edit:
@@ -54,6 +56,14 @@ def shifted(edit: Edit, done: Edit) -> Edit | None:
         by = len(done.new.encode()) - (done.end - done.start)
         return replace(edit, start=edit.start + by, end=edit.end + by)
     return None
+
+
+def moved(edit: Edit, done: Iterable[Edit]) -> Edit | None:
+    """The same edit of a text in which others were made one after the other; None where it overlaps one."""
+    found: Edit | None = edit
+    for before in done:
+        found = shifted(found, before) if found is not None else None
+    return found
 
 
 def distinct(nodes: Iterable[Node]) -> list[Node]:
