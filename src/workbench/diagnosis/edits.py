@@ -327,7 +327,8 @@ class _Walker:
             self._add(first, last, f"{two}, {one}", SWAP, node.lineno)
         for argument in arguments:
             if name in SHAPES:
-                if isinstance(argument, ast.List | ast.Tuple) or not isinstance(argument, ast.Constant):
+                number = argument.operand if isinstance(argument, ast.UnaryOp) else argument
+                if not isinstance(number, ast.Constant):
                     self._expression(argument, node)
                 continue
             if name not in ("sin", "cos"):
