@@ -41,6 +41,9 @@ BROKEN = 10
 MOST_ACCIDENTS = 6
 """Sums that are right for this robot's numbers and no others, after which no more are looked at thoroughly."""
 
+WORSE_FIRST = 8
+"""Sources that got no better that are taken further before terms are put in, where most is wrong."""
+
 MOST_INSERTS = 6000
 
 STEPS = 6
@@ -116,11 +119,13 @@ class _Search:
     def _followed(self, root: Node) -> Node:
         """The best source that is found in time."""
         best, better, worse, filled = root, [root], list[Node](), list[Node]()
-        seen = {root.text}
+        seen, left = {root.text}, 0
         while (better or worse) and not best.complete and time.monotonic() < self._deadline:
             # the best source first; one that led nowhere gives way to the next best, at last to the least wrong
             climbing = bool(better)
-            if not climbing and filled:
+            # where most is wrong two mistakes in kinematics hide each other; where little is, a term may be missing
+            hidden = 2 * best.look.base.sum() < best.look.base.size and len(worse) > max(0, left - WORSE_FIRST)
+            if not climbing and filled and not hidden:
                 node, climbing = filled.pop(), True
                 found = [n for n in self._inserted(node) if _key(n) > _key(best)]
             else:
@@ -141,6 +146,7 @@ class _Search:
             if node is root:
                 kept = [n for n in self._looked[node.text] if n.text not in seen and n.edit.kind in LIKELY]
                 worse = distinct_looks(sorted(kept, key=lambda n: n.look.key, reverse=True))
+                left = len(worse)
         return best
 
     def _expand(self, node: Node, thorough: bool) -> list[Node]:
