@@ -451,3 +451,31 @@ def test_sources_compiled_statement_by_statement_are_the_same() -> None:
     assert [a is b for a, b in zip(first, second, strict=True)].count(False) == 1
     with pytest.raises(SyntaxError):
         code_of("def broken(:", "file.py")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "mistakes",
+    [
+        {"centre = elbow - p.r": "centre = elbow + p.r", "x = centre[:, 0] + middle": "x = centre[:, 0] - middle"},
+        {"p.Ia + p.ma * p.a**2 / 4": "p.Ia - p.ma * p.a**2 / 4", "cross * elbow + (far": "cross * elbow - (far"},
+        pytest.param({"near * elbow + cross * x[:, None] + (near": "near * elbow + (near"}, marks=pytest.mark.long),
+    ],
+    ids=["each spoils everything", "in parts of their own", "a term is missing"],
+)
+def test_mistakes_are_put_back_one_after_the_other(repository: Path, tmp_path: Path, mistakes: dict[str, str]) -> None:
+    home, path = repository / "examples" / "delta", tmp_path / "delta.py"
+    text = (home / "delta.py").read_text(encoding="utf-8")
+    for right, wrong in mistakes.items():
+        assert text.count(right) == 1
+        text = text.replace(right, wrong)
+    path.write_text(text, encoding="utf-8")
+    subject = subjects(home / "delta.toml", candidates=[path], candidate="exact")[0]
+    _, seen = diagnose_subject(subject)
+    found, notes = search_mends(subject, seen, 600.0, 1)
+    steps = sorted({s.step for s in found})
+    assert steps == list(range(1, len(mistakes) + 1)), notes
+    assert found[-1].left == 0
+    mended = tmp_path / "mended.py"
+    mended.write_text(next(s for s in found if s.step == steps[-1]).text, encoding="utf-8")
+    assert diagnosed(home / "delta.toml", mended, "exact").right
