@@ -133,6 +133,8 @@ class _Search:
                 if node.whole is None:
                     self._fill([node])
                 found = self._expand(node, climbing)
+                if not found:  # tens of thousands of sources that led nowhere are not kept
+                    self._looked[node.text], self._breaks[node.text] = [], {}
                 if node is root or (climbing and node is best):
                     filled.append(node)
             if found and _rank(found[0]) > _rank(best):
