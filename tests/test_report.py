@@ -622,7 +622,9 @@ def test_the_drawing_moves_as_the_points_do(run: Path) -> None:
     assert figure["data-case"] == "case-sim1"
     assert told["lines"] == {"driven": [[0, 1]], "platform": [[2, 3]]}
     assert told["joints"] == {"hinge-driven": [0], "ball": [1]}
-    frames = np.cumsum(np.array(told["views"][1]), axis=0).reshape(len(told["t"]), 4, 2) / told["scale"]
+    places = np.cumsum(np.array(told["places"]), axis=0).reshape(len(told["t"]), 4, 3) / told["scale"]
+    view = np.array(told["views"][1])
+    frames = places @ view[:, :3].T + view[:, 3]
     t = np.array(told["t"])
     # the arm's length on paper is the same at all times, as it is in the view along its axis
     arm = np.hypot(*(frames[:, 1] - frames[:, 0]).T)

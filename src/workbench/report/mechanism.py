@@ -22,7 +22,7 @@ FRAME_COUNTS = (24, 48, 96, 192, 384)
 SMOOTH = 0.008
 """Share of the drawing by which a point may leave the straight line between two frames."""
 SCALE = 10
-"""Frames hold tenths of a point."""
+"""Frames hold tenths of a point of the drawing, or less."""
 AZIMUTH, ELEVATION = np.radians(38.0), np.radians(22.0)
 DRIVEN = PALETTE[1]
 PLATFORM = PALETTE[0]
@@ -230,21 +230,34 @@ def _draw_mechanism(axes: Axes, view: View, skeleton: Skeleton, number: int) -> 
 
 
 def _animation(skeleton: Skeleton, kept: np.ndarray, time: FloatArray, layout: Layout) -> str:
-    """Return times, lines, joints and positions in tenths of a point of the drawing, as JSON."""
-    to_points = np.array([SIZE[0], SIZE[1]]) * POINTS_PER_INCH
-    views = []
+    """Return times, lines, joints, positions in space and the views' projections onto the drawing, as JSON.
+
+    Positions are whole multiples of ``1 / scale``, in the order of time and as differences; each view has two rows
+    ``[ax, ay, az, b]``, which make a point of the drawing ``(a . p + b)``.
+    """
+    width, height = np.array(SIZE) * POINTS_PER_INCH
+    centre = skeleton.points[kept].reshape(-1, 3).mean(axis=0)
+    views, largest = [], 0.0
     for view, box, (x0, x1, y0, y1) in layout:
-        flat = view(skeleton.points[kept])
-        x = (box[0] + box[2] * (flat[..., 0] - x0) / (x1 - x0)) * to_points[0]
-        y = (1 - box[1] - box[3] * (flat[..., 1] - y0) / (y1 - y0)) * to_points[1]
-        tenths = np.rint(SCALE * np.stack([x, y], axis=-1)).astype(int).reshape(len(kept), -1)
-        first, steps = tenths[0], np.diff(tenths, axis=0)
-        views.append([first.tolist(), *steps.tolist()])  # differences: smaller numbers, a third of the bytes
+        across, down = box[2] * width / (x1 - x0), box[3] * height / (y1 - y0)
+        start = np.array([box[0] * width, (1 - box[1]) * height])
+        middle = view(centre) - [x0, y0]
+        views.append(
+            [
+                [*(across * view.right), start[0] + across * middle[0]],
+                [*(-down * view.up), start[1] - down * middle[1]],
+            ]
+        )
+        largest = max(largest, across, down)
+    scale = SCALE * largest
+    places = np.rint((skeleton.points[kept] - centre) * scale).astype(int).reshape(len(kept), -1)
     told = {
         "t": [float(f"{v:.6g}") for v in time[kept]],
-        "scale": SCALE,
+        "scale": float(f"{scale:.9g}"),
         "lines": {kind: [list(pair) for pair in pairs] for kind, pairs in skeleton.lines},
         "joints": {kind: list(members) for kind, members in skeleton.joints},
-        "views": views,
+        "views": [[[float(f"{v:.7g}") for v in row] for row in rows] for rows in views],
+        # differences: smaller numbers, a third of the bytes
+        "places": [places[0].tolist(), *np.diff(places, axis=0).tolist()],
     }
     return json.dumps(told, separators=(",", ":"))

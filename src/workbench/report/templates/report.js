@@ -159,10 +159,13 @@
   const parsePath = (d) => {
     const found = [];
     let [x, y] = [0, 0];
-    for (const match of d.matchAll(/([Ml])\s*(-?[\d.]+)\s+(-?[\d.]+)/g)) {
-      const [first, second] = [Number(match[2]), Number(match[3])];
-      [x, y] = match[1] === "M" ? [first, second] : [x + first, y + second];
-      found.push([match[1] === "M" ? "M" : "L", x, y]);
+    for (const [, kind, told] of d.matchAll(/([Ml])([^A-Za-z]*)/g)) {
+      const numbers = told.match(/-?(?:\d+\.?\d*|\.\d+)/g) ?? [];
+      for (let k = 0; k + 1 < numbers.length; k += 2) {
+        const [first, second] = [Number(numbers[k]), Number(numbers[k + 1])];
+        [x, y] = kind === "M" ? [first, second] : [x + first, y + second];
+        found.push([kind === "M" ? "M" : "L", x, y]);
+      }
     }
     return found;
   };
@@ -183,7 +186,7 @@
         return path ? { label, path, points: parsePath(path.getAttribute("d")) } : null;
       }).filter(Boolean);
       this.uses = [...this.group.querySelectorAll("use")]
-        .filter((use) => !use.closest('[class^="wb-times"]') && Number(use.getAttribute("x")) > this.left + 0.01)
+        .filter((use) => !use.closest('[class^="wb-times"]') && Number(use.getAttribute("x")) > this.left + 0.06)
         .map((use) => ({ use, x: Number(use.getAttribute("x"))}));
       this.moments = [...this.group.querySelectorAll(".wb-moment")];
       this.cursor = draw("line", { class: "cursor", y1: this.top, y2: this.bottom, visibility: "hidden" }, svg);
@@ -281,10 +284,15 @@
   class Mechanism {
     constructor(svg, told) {
       this.told = told;
-      this.views = told.views.map((rows) => {
-        const sum = rows[0].map(() => 0);
-        return rows.map((row) => row.map((step, k) => (sum[k] += step) / told.scale));
-      });
+      const sum = told.places[0].map(() => 0);
+      const places = told.places.map((row) => row.map((step, k) => (sum[k] += step) / told.scale));
+      this.views = told.views.map((rows) => places.map((place) => {
+        const flat = [];
+        for (let k = 0; k < place.length; k += 3) {
+          for (const [a, b, c, d] of rows) flat.push(a * place[k] + b * place[k + 1] + c * place[k + 2] + d);
+        }
+        return flat;
+      }));
       this.lines = told.views.map((_, view) => Object.entries(told.lines).map(
         ([kind, pairs]) => [svg.querySelector(`.wb-line-${view}-${kind} path`), pairs]));
       this.joints = told.views.map((_, view) => Object.entries(told.joints).map(
