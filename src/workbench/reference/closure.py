@@ -16,6 +16,7 @@ from workbench.reference.continuation import ASTRAY, NEWTON_STEPS, Assembly
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import integrate, newton_step
 from workbench.reference.rows import constraint_rows
+from workbench.reference.sides import pattern_of
 from workbench.reference.structure import Structure
 from workbench.reference.tables import tables_of
 from workbench.reference.tolerance import KEY, RANK
@@ -32,6 +33,7 @@ class LoopCloser(OrderedClosure):
         super().__init__(engine, structure)
         self._home = self._close_home(structure.home_qpos[None, :].copy())
         self.home = self._home.qpos[0]
+        self._look_at_sides(self.jacobian(self.home), pattern_of(structure, self.joints[2]), structure.passive)
         self.start = self.home[structure.actuated_qpos]
 
     def _close_home(self, home: FloatArray) -> Assembly:
@@ -81,6 +83,9 @@ class LoopCloser(OrderedClosure):
             drawn=float(drawn.max()),
             qpos=closed[0].tolist(),
         )
+
+    def _solved(self, qpos: FloatArray) -> FloatArray:
+        return np.stack([self.jacobian(one) for one in qpos])[:, :, self._side_table.columns]
 
     @property
     def at_home(self) -> Assembly:
@@ -132,8 +137,8 @@ class LoopCloser(OrderedClosure):
         for _ in range(NEWTON_STEPS):
             poses = evaluator.place(active)
             active = newton_step(
-                active, self.tables.closures, self.joints, self.tables.split, poses.tables, limits, qpos, found.qpos,
-                found.residual, found.tangent, found.rank, found.condition, found.weakest,
+                active, self.tables.closures, self.joints, self.tables.split, self._side_table, poses.tables, limits,
+                qpos, found.qpos, found.residual, found.tangent, found.rank, found.condition, found.weakest, found.side,
             )  # fmt: skip
             if not len(active):
                 break
