@@ -21,6 +21,7 @@ SIZE = (9.0, 3.6)
 NARROW = 7.0
 """Inches below which panels stand close together: in the style of a paper."""
 UPWARDS = "upwards [m]"
+SKETCH = (4.4, 3.4)
 FRAME_COUNTS = (24, 48, 96, 192, 384)
 SMOOTH = 0.008
 """Share of the drawing by which a point may leave the straight line between two frames."""
@@ -81,6 +82,29 @@ def mechanism_plot(run: Run, case: str, key: str, series: Series) -> Plot | None
         "hinges and ball joints (filled), squares slides, orange what is driven; blue the platform and its path",
         key,
         _animation(found, kept, series["t"], layout),
+    )
+
+
+def robot_sketch(run: Run, case: str, series: Series) -> Plot | None:
+    """Draw the robot as a reader meets it first, obliquely at the first sample; None where no points are stored."""
+    record = run.manifest.cases[case].drawing
+    found = _skeleton(record, series) if record else None
+    if record is None or found is None:
+        return None
+    views = _views(np.array(record.up, dtype=np.float64), run.manifest.platform_axes)[:1]
+    ((view, _, limits),) = _layout(views, found.points, SKETCH)
+
+    def draw(figure: FigureBase) -> None:
+        axes = _panel(figure, view, (0.02, 0.02, 0.96, 0.96), limits, run.manifest.platform_axes)
+        _draw_mechanism(axes, view, found, 0)
+
+    return Plot(
+        "figure-robot",
+        SKETCH,
+        draw,
+        f"The mechanism in case {case} at its first sample: {len(record.links)} moving bodies, {len(record.joints)} "
+        "joints; a thin line is the path of the platform.",
+        f"The robot in case {case}, drawn from the reference's own positions; orange is driven, blue the platform",
     )
 
 
@@ -157,11 +181,11 @@ def _frames(points: FloatArray) -> np.ndarray:
 Layout = list[tuple[View, tuple[float, float, float, float], tuple[float, float, float, float]]]
 
 
-def _layout(views: tuple[View, ...], points: FloatArray) -> Layout:
+def _layout(views: tuple[View, ...], points: FloatArray, whole: tuple[float, float] = SIZE) -> Layout:
     """Give each view a box, fractions of the figure, and limits of equal scale that hold everything at all times."""
-    width, height = SIZE
-    left, gap, bottom, top = 0.05, 0.62, 0.45, 0.12
-    room = (width - 2 * gap - left - 0.1) / 3
+    width, height = whole
+    left, gap, bottom, top = 0.05, 0.62, 0.45 if len(views) > 1 else 0.05, 0.12
+    room = (width - (len(views) - 1) * gap - left - 0.1) / len(views)
     layout: Layout = []
     for number, view in enumerate(views):
         flat = view(points).reshape(-1, 2)

@@ -114,4 +114,6 @@ class Shapes:
             shapes.append(
                 f'<path id="{name}" {body}/>' if kind == "path" else f'<clipPath id="{name}">{body}</clipPath>'
             )
-        return '<svg class="shapes" width="0" height="0" aria-hidden="true"><defs>' + "\n".join(shapes) + "</defs></svg>"
+        return (
+            '<svg class="shapes" width="0" height="0" aria-hidden="true"><defs>' + "\n".join(shapes) + "</defs></svg>"
+        )

@@ -117,7 +117,9 @@ def compact(svg: str, key: str) -> str:
     svg = _GEOMETRY.sub(
         lambda match: _LONG_NUMBER.sub(lambda number: f"{float(number[0]):.2f}", match[0].replace("\n", "")), svg
     )
-    svg = _PLACE.sub(lambda match: _NUMBER.sub(lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), match[0]), svg)
+    svg = _PLACE.sub(
+        lambda match: _NUMBER.sub(lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), match[0]), svg
+    )
     svg = _FONT.sub("font-family: sans-serif", svg)
     svg = _UPRIGHT.sub("", svg)
     short: dict[str, str] = {}
