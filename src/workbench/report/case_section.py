@@ -183,7 +183,7 @@ def _error_table(run: Run, case: str, kind: str, rows: list[ErrorRow], anchor: s
     for row in rows:
         total = f" of {samples}" if samples is not None else ""
         cells = [
-            Cell(row.joint),
+            Cell(joint_heading(run, row.joint)),
             Cell(row.candidate),
             Cell(row.reference),
             Cell(number(row.peak_error), row.peak_error, emphasis=True),

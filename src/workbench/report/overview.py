@@ -1,4 +1,4 @@
-"""One figure that shows a campaign at a glance: every case a row, its errors against their bounds, and what is measured.
+"""One figure that shows a campaign at a glance: a row for each case, its errors against bounds, and what is measured.
 
 Left are the errors that have a bound to keep, right those of other assumptions and of formulas that nothing judges.
 """
@@ -89,10 +89,10 @@ def _panels(figure: FigureBase, cases: Sequence[str], number: int) -> list[Axes]
     left = 0.2 + LETTER * max(len(_name(case)) for case in cases)
     bottom, top, gap = 0.44 / height, 1 - (height - 0.5 - ROW * len(cases)) / height, 0.55
     room = (width - left - 0.3 - gap * (number - 1)) / number
-    axes = []
-    for turn in range(number):
-        axes.append(figure.add_axes(((left + turn * (room + gap)) / width, bottom, room / width, top - bottom)))
-    return axes
+    return [
+        figure.add_axes(((left + turn * (room + gap)) / width, bottom, room / width, top - bottom))
+        for turn in range(number)
+    ]
 
 
 def _name(case: str) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 
 from workbench.report.plot import Plot
 
-
 SHORT = {
     "The papers' claims": "Claims",
     "Worst errors first": "Worst errors",
