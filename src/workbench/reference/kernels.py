@@ -197,7 +197,8 @@ def projection(  # type: ignore[no-untyped-def]
             value = 0.0
             for d in range(nv):
                 value += jac[i, d] * qvel[s, d]
-            worst = max(worst, abs(value))
+            # a maximum passes over what is no number
+            worst = math.inf if math.isnan(value) else max(worst, abs(value))
         velocity_residual[s] = worst
         _along(tangent[s], qdd[s], qacc[s])
         body_motion(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], v, acc)
@@ -214,7 +215,7 @@ def projection(  # type: ignore[no-untyped-def]
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
         worst = 0.0
         for i in range(m):
-            worst = max(worst, abs(rates[i]))
+            worst = math.inf if math.isnan(rates[i]) else max(worst, abs(rates[i]))
         acceleration_residual[s] = worst
         # generalized force of the motion
         for d in range(nv):
