@@ -12,6 +12,7 @@ CAMPAIGN ?= campaigns/almeida_2010.toml
 SLOW ?=
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
+MUTANTS_ARGS ?=
 # Campaigns whose reports are kept in reports/published.
 PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models design_sweep
 
@@ -19,7 +20,7 @@ PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_model
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow test-long test-browser test-floors reports bench lint format clean
+.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports bench lint format clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -75,6 +76,10 @@ else
 	@$(VENV)-floors/bin/python -m pip install --quiet --disable-pip-version-check --constraint build/floors.txt --editable '.[dev]'
 endif
 	$(VENV)-floors/bin/pytest -n 2 --dist worksteal $(PYTEST_ARGS)
+
+# Hours where CPU is scarce; what was tried is kept in build/mutants, so that it can be stopped and gone on with.
+mutants: $(STAMP) ## Plant small faults in the core modules and see which no test notices (MUTANTS_ARGS=--help)
+	PYTHONPATH=tests:src $(BIN)/python -m mutants $(MUTANTS_ARGS)
 
 # Rendered pictures depend on the machine's OpenGL, so those that are kept are used again; remove them to draw new ones.
 reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings in their heads differ

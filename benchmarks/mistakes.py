@@ -3,6 +3,9 @@
     python benchmarks/mistakes.py --count 300 --seed 1 --out mistakes.json [--search] [--at-once 2]
 
 Formulas: the papers' appendix and eq. (4), the 4-RPRP by screws, a Delta and a planar 3-RRR, each as one plain file.
+One process for all: the reference answers each question once for each robot, since only the formula changes, and edits
+are scored in this process, without a worker's limits. So the times printed are of a warm diagnosis, on one core, in
+seconds of its own.
 A mistake is one edit of the kinds of issue "diagnose" (signs, factors, sine for cosine, indices, names, parameters,
 exponents, quotients, terms dropped), chosen at random with equal weight for each kind, on a line that the formula runs
 through. Edits that change no torque at any of the probed states, with parameters varied or not, are no mistakes and are
@@ -19,10 +22,14 @@ import tempfile
 import time
 from collections import Counter, defaultdict
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from workbench.campaign.user_candidates import load_candidates
+from workbench.diagnosis import examine, search
+from workbench.diagnosis.case_subject import CaseSubject
 from workbench.diagnosis.edits import (
     DROP,
     EXPONENT,
@@ -37,10 +44,10 @@ from workbench.diagnosis.edits import (
     edits_of,
 )
 from workbench.diagnosis.entries import WRONG_MARK, compare_parts, floors_of
-from workbench.diagnosis.examine import diagnose_subject
 from workbench.diagnosis.parts import FORCE, ODD, REST, take_apart
 from workbench.diagnosis.probes import ask, choose_poses, make_plan
-from workbench.diagnosis.search import groups_of, lines_run, search_mends
+from workbench.diagnosis.result import NUMERIC
+from workbench.diagnosis.search import groups_of, lines_run
 from workbench.diagnosis.surface import subjects
 from workbench.errors import WorkbenchError
 
@@ -75,11 +82,68 @@ def formulas(folder: Path, names: list[str]) -> dict[str, tuple[Path, Path, str]
         path.write_text(text)
         campaign = "garcia_murillo_2016" if name == "screws" else "almeida_2010"
         found[name] = ROOT / "campaigns" / f"{campaign}.toml", path, f"printed-{name}"
-    for name, candidate in (("delta", "exact"), ("rrr", "virtual-work")):
-        home = ROOT / "examples" / name
-        if (home / f"{name}.py").is_file():
-            found[name] = home / f"{name}.toml", home / f"{name}.py", candidate
+    for home, candidate in ((ROOT / "examples" / "delta", "exact"), (ROOT / "benchmarks" / "rrr", "virtual-work")):
+        name = home.name
+        found[name] = home / f"{name}.toml", home / f"{name}.py", candidate
     return {name: found[name] for name in names if name in found}
+
+
+class Warm(CaseSubject):
+    """A formula on a robot whose reference has been asked the same before."""
+
+    memory: dict[Any, Any]
+
+    @classmethod
+    def of(cls, subject: CaseSubject, memory: dict[Any, Any]) -> Warm:
+        warm = cls(subject.case, subject.candidate, subject.mass_model, subject._others)
+        warm.memory, warm._references = memory, subject._references
+        warm.__dict__["motion"] = subject.motion
+        return warm
+
+    def torques_of_reference(self, q, qd, qdd, force, changes):
+        key = (*(array.tobytes() for array in (q, qd, qdd, force)), *sorted(changes.items()))
+        if key not in self.memory:
+            try:
+                self.memory[key] = super().torques_of_reference(q, qd, qdd, force, changes)
+            except WorkbenchError as error:
+                self.memory[key] = error
+        if isinstance(self.memory[key], WorkbenchError):
+            raise self.memory[key]
+        return self.memory[key]
+
+
+def remember(function, key):
+    """The same function, asked once for each key of its arguments."""
+    known = {}
+
+    def remembered(*arguments):
+        name = key(*arguments)
+        if name not in known:
+            known[name] = function(*arguments)
+        return known[name]
+
+    return remembered
+
+
+def warm() -> None:
+    """Let poses and items of a robot be found once."""
+    examine.choose_poses = remember(choose_poses, lambda subject, *count: (subject.case.robot.name, *count))
+    items = examine.items_of
+    examine.items_of = remember(items, lambda s, plan: (s.case.robot.name, s.mass_model, plan.poses.tobytes()))
+
+
+class InProcess:
+    """Scores edits where the search runs, in place of `workbench.sweep.supervisor.Supervisor`."""
+
+    def __init__(self, jobs, setup, *limits) -> None:
+        self.work = setup()
+
+    def run(self, tasks):
+        for number, task in tasks:
+            yield number, self.work(task)
+
+    def close(self) -> None:
+        """Nothing to close."""
 
 
 def parts_at(subject, plan, changes):
@@ -94,8 +158,9 @@ class Bench:
     def __init__(self, campaign: Path, path: Path, candidate: str, rng: random.Random) -> None:
         self.campaign, self.path, self.candidate, self.rng = campaign, path, candidate, rng
         self.text = path.read_text()
-        self.subject = subjects(campaign, candidates=[path], candidate=candidate)[0]
-        self.plan = make_plan(self.subject, choose_poses(self.subject))
+        self.memory: dict[Any, Any] = {}
+        self.subject = Warm.of(subjects(campaign, candidates=[path], candidate=candidate)[0], self.memory)
+        self.plan = make_plan(self.subject, examine.choose_poses(self.subject))
         self.parameters = [p for p in self.subject.parameters if p.read and p.kind in ("mass", "inertia")]
         self.right = {None: parts_at(self.subject, self.plan, {})}
         for p in self.parameters:
@@ -107,22 +172,24 @@ class Bench:
         for edit in edits:
             if edit.kind in KINDS:
                 self.by_kind[edit.kind].append(edit)
+        self.redrawn = 0
 
     def truth(self, subject):
-        """Entries that differ, and parameters whose shares do; None where the formula fails."""
-        wrong = {None: parts_at(subject, self.plan, {})}
-        if not any(np.isfinite(v).any() for v in wrong[None].values()):
+        """Entries that differ, and parameters whose shares do; None where the formula fails or nothing differs."""
+        wrong = parts_at(subject, self.plan, {})
+        if not any(np.isfinite(v).any() for v in wrong.values()):
             return None
         entries = {
-            (e.part, e.joint)
-            for e in compare_parts(wrong[None], self.right[None], self.floors)
-            if e.status == WRONG_MARK
+            (e.part, e.joint) for e in compare_parts(wrong, self.right[None], self.floors) if e.status == WRONG_MARK
         }
+        whole = np.flatnonzero(np.all([np.isfinite(v).all(axis=1) for v in wrong.values()], axis=0))[:8]
+        poses = whole if len(whole) else np.arange(8)
+        few = make_plan(subject, self.plan.poses[poses])
         shares = set()
         for p in self.parameters:
-            moved = parts_at(subject, self.plan, {p.name: p.varied})
-            mine = {k: moved[k] - v for k, v in wrong[None].items()}
-            theirs = {k: v - self.right[None][k] for k, v in self.right[p.name].items()}
+            moved = parts_at(subject, few, {p.name: p.varied})
+            mine = {k: moved[k] - v[poses] for k, v in wrong.items()}
+            theirs = {k: v[poses] - self.right[None][k][poses] for k, v in self.right[p.name].items()}
             if any(e.status == WRONG_MARK for e in compare_parts(mine, theirs, self.floors, 1e-6, 1e-10)):
                 shares.add(p.name)
         if not entries and not shares:
@@ -156,25 +223,28 @@ class Bench:
                 users = load_candidates([path])
                 case = self.subject.case
                 case.robot.offer({u.name: u.as_candidate() for u in users if u.name == self.candidate})
-                subject = type(self.subject)(case, self.candidate, self.subject.mass_model, self.subject._others)
-                subject.__dict__["motion"] = self.subject.motion
-                subject._references = self.subject._references
-                subject.__dict__["reads"] = self.subject.reads
+                subject = Warm.of(self.subject, self.memory)
                 truth = self.truth(subject)
             except (WorkbenchError, SyntaxError):
                 continue
             if truth is None:
+                self.redrawn += 1
                 continue
             return subject, kinds, lines, truth, text
         raise SystemExit("no mistake to be planted")
 
 
-def judged(bench: Bench, subject, truth, text: str, lines: list[int], search: bool, limit: float) -> dict:
+def judged(bench: Bench, subject, truth, text: str, lines: list[int], mend: bool, limit: float) -> dict:
     """What the diagnosis says of one planted formula, held against the truth."""
     entries, shares = truth
-    begun = time.perf_counter()
-    diagnosis, seen = diagnose_subject(subject)
+    begun = time.process_time()
+    diagnosis, seen = examine.diagnose_subject(subject)
     named = {(e.part, e.joint) for e in diagnosis.wrong if e.part.kind not in (ODD, REST)}
+    for finding in diagnosis.findings:
+        if finding.kind == NUMERIC:  # the table shows what is noisy as right, the finding says that it is not
+            strict = compare_parts(seen.formula, seen.reference, seen.floors)
+            named |= {(e.part, e.joint) for e in strict if e.status == WRONG_MARK and e.part.kind not in (ODD, REST)}
+            assert {e.part.label(subject.joints) for e in strict if e.status == WRONG_MARK} <= set(finding.parts)
     true = {(part, joint) for part, joint in entries if part.kind not in (ODD, REST)}
     kinematic = any(f.kind == "kinematics" for f in diagnosis.findings)
     parameters = {name for f in diagnosis.findings for name in f.parameters}
@@ -186,15 +256,14 @@ def judged(bench: Bench, subject, truth, text: str, lines: list[int], search: bo
         # kinematics is right where the force response or several masses' shares are wrong, and only there
         "parameter": (moves if kinematic else parameters == shares or (not shares and bool(bodies)))
         or (bool(parameters) and parameters <= shares),
-        "seconds_findings": round(time.perf_counter() - begun, 2),
+        "seconds_findings": round(time.process_time() - begun, 2),
         "findings": [f.sentence for f in diagnosis.findings],
     }
-    if search:
-        begun = time.perf_counter()
-        found, _ = search_mends(subject, seen, limit)
-        row["seconds_search"] = round(time.perf_counter() - begun, 2)
+    if mend:
+        begun = time.process_time()
+        found, _ = search.search_mends(subject, seen, limit)
+        row["seconds_search"] = round(time.process_time() - begun, 2)
         want = bench.text.splitlines()
-        have = text.splitlines()
         steps = sorted({s.step for s in found})
         got = 0
         for line in lines:
@@ -205,7 +274,7 @@ def judged(bench: Bench, subject, truth, text: str, lines: list[int], search: bo
                     break
         row["undone"] = got == len(lines)
         row["complete"] = bool(found) and found[-1].left == 0
-        row["planted"] = [(have[line - 1].strip(), want[line - 1].strip()) for line in lines]
+        row["mends"] = [f"{s.step}: {s.diff}" for s in found]
     return row
 
 
@@ -225,28 +294,33 @@ def main() -> None:
     parser.add_argument("--search", action="store_true")
     parser.add_argument("--limit", type=float, default=60.0)
     parser.add_argument("--robots", default="appendix,equation4,screws,delta,rrr")
-    parser.add_argument("--rrr", type=Path, help="folder with rrr.toml and its formula, where examples/ has none")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     rng = random.Random(options.seed)
+    search.Supervisor = InProcess
+    search.time = SimpleNamespace(monotonic=time.process_time)  # other processes do not shorten a search
+    warm()
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         table = formulas(folder, options.robots.split(","))
-        if options.rrr and "rrr" in options.robots.split(","):
-            table["rrr"] = options.rrr / "rrr.toml", next(options.rrr.glob("*.py")), "virtual-work"
         benches = {robot: Bench(*entry, rng) for robot, entry in table.items()}
         for number in range(options.count):
             robot = list(benches)[number % len(benches)]
             bench = benches[robot]
             subject, kinds, lines, truth, text = bench.planted(folder, options.at_once)
-            row = {"robot": robot, "kinds": kinds, "lines": lines}
+            row = {"robot": robot, "kinds": kinds, "lines": lines, "seed": options.seed}
             row |= judged(bench, subject, truth, text, lines, options.search, options.limit)
             rows.append(row)
             print(number, robot, kinds, {k: v for k, v in row.items() if isinstance(v, bool)}, flush=True)
+            if not all(v for v in row.values() if isinstance(v, bool)):
+                was, now = bench.text.splitlines(), text.splitlines()
+                row["planted"] = [(now[line - 1].strip(), was[line - 1].strip()) for line in lines]
+                print("   ", row["planted"], row["findings"], row.get("mends"), flush=True)
             if options.out:
                 options.out.write_text(json.dumps(rows, indent=1) + "\n")
     summary(rows)
+    print(f"drawn again, since no torque changes or all fail: {sum(bench.redrawn for bench in benches.values())}")
 
 
 def summary(rows: list[dict]) -> None:

@@ -12,9 +12,9 @@ from collections import defaultdict
 import numpy as np
 
 import workbench as wb
+from workbench.campaign.recorded import ALARM
 from workbench.motion.digits import rounding_of
 from workbench.recorded.propagate import uncertainty
-from workbench.recorded.read import UNIFORM
 from workbench.recorded.smoothing import smooth
 
 DIGITS = (3, 4, 5, 6, 7, 8, 9)
@@ -42,7 +42,7 @@ def random_motion(
 
 
 def trial(robot: object, digits: int, step_ms: int, noisy: bool, rng: np.random.Generator) -> np.ndarray:
-    """Per joint: error over stated uncertainty, share of samples in the band, uncertainty over peak torque; (3, 3)."""
+    """Per joint: error over stated uncertainty, largest error over band, uncertainty over peak torque; (3, 3)."""
     t = np.arange(round(1e3 * DURATION_S / step_ms) + 1) * 1e-3 * step_ms
     q, qd, qdd = random_motion(robot.inverse_kinematics(np.array([PLACE]))[0], rng, t)  # type: ignore[attr-defined]
     tau = robot.inverse_dynamics(q, qd, qdd)  # type: ignore[attr-defined]
@@ -50,34 +50,35 @@ def trial(robot: object, digits: int, step_ms: int, noisy: bool, rng: np.random.
     recorded = tau + (NOISE * peak * rng.standard_normal(tau.shape) if noisy else 0.0)
     decimals = digits - 1 - np.floor(np.log10(np.abs(q).max(axis=0))).astype(int)
     written = np.column_stack([np.round(column, d) for column, d in zip(q.T, decimals, strict=True)])
-    smoothed = [smooth(t, column, rounding_of(column)[0] * UNIFORM) for column in written.T]
+    smoothed = [smooth(t, column, rounding_of(column)[0]) for column in written.T]
     seen = tuple(np.column_stack([getattr(one, name) for one in smoothed]) for name in ("q", "qd", "qdd"))
     noise = np.array([smooth(t, column).sigma for column in recorded.T])
     found = uncertainty(robot.inverse_dynamics, seen, smoothed, noise, np.zeros_like(q))  # type: ignore[attr-defined]
     error = np.abs(recorded - robot.inverse_dynamics(*seen))  # type: ignore[attr-defined]
-    return np.column_stack([error.max(axis=0) / found.peak, (error <= found.band).mean(axis=0), found.peak / peak])
+    return np.column_stack([error.max(axis=0) / found.peak, (error / found.band).max(axis=0), found.peak / peak])
 
 
-def main(trials: int = 200, seed: int = 1) -> None:
+def main(trials: int = 210, seed: int = 1) -> None:
     """Print coverage by digits, by step and in all, with and without noise of the torques."""
     robot = wb.load_mechanism("models/asym_2rss_ppap.xml")
     for noisy in (False, True):
         rng = np.random.default_rng(seed + noisy)
-        by: dict[tuple[str, int], list[np.ndarray]] = defaultdict(list)
+        by: dict[tuple[str, int | str], list[np.ndarray]] = defaultdict(list)
         for number in range(trials):
             digits, step = DIGITS[number % len(DIGITS)], STEPS_MS[(number // len(DIGITS)) % len(STEPS_MS)]
             found = trial(robot, digits, step, noisy, rng)
-            for key in (("digits", digits), ("step [ms]", step), ("all", trials)):
+            for key in (("digits", digits), ("step [ms]", step), ("all", "")):
                 by[key].append(found)
         print(f"torques {'with noise of 0.3 %' if noisy else 'without noise'}")
-        print("| | | trials | covered | whole curve in the band | stated uncertainty, median |")
-        print("|---|---|---|---|---|---|")
+        print("| | | trials | covered | whole curve in the band | false alarms | stated uncertainty, median |")
+        print("|---|---|---|---|---|---|---|")
         for (what, value), results in sorted(by.items()):
             all_ = np.array(results)
-            covered, inside = (all_[:, :, 0] <= 1.0).mean(), (all_[:, :, 1] == 1.0).mean()
+            covered, inside = (all_[:, :, 0] <= 1.0).mean(), (all_[:, :, 1] <= 1.0).mean()
+            alarms = (all_[:, :, 1] > ALARM).mean()
             print(
                 f"| {what} | {value} | {len(results)} | {100 * covered:.1f} % | {100 * inside:.1f} % |"
-                f" {100 * np.median(all_[:, :, 2]):.2g} % |",
+                f" {100 * alarms:.1f} % | {100 * np.median(all_[:, :, 2]):.2g} % |",
                 flush=True,
             )
 

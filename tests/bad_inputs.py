@@ -1,120 +1,18 @@
-"""Bad inputs of every kind, and what calls the command line with them in a process that is watched.
+"""Bad inputs of every kind.
 
 A case is a name, files to be written beside `GOOD`, the command line, and a word that its one line must hold.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
 import re
-import resource
-import shutil
-import time
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
+from judged_call import Bad, Content
 from small_campaign import CANDIDATES, CASE, HEAD
 from sweep_campaign import SWEEP
-
-LONGEST_S, LARGEST_MB = 60.0, 2500.0
-ADDRESSES_MB = 16_000.0
-PROGRESS = re.compile(r"\[\d+/\d+\] |workbench: compiling ")
-
-Content = str | bytes | Callable[[Path], object]
-
-
-@dataclass(frozen=True)
-class Bad:
-    """A bad input: files (or what makes them) by name, arguments, and what the line must say."""
-
-    name: str
-    arguments: tuple[str, ...]
-    files: Mapping[str, Content] = field(default_factory=dict)
-    says: str = ""
-    codes: tuple[int, ...] = (2,)
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What the command line did."""
-
-    code: int
-    out: str
-    err: str
-    seconds: float
-    megabytes: float
-    grown: bool
-    """whether the process had never been as large before"""
-
-    @property
-    def lines(self) -> list[str]:
-        return [line for line in self.err.splitlines() if line.strip() and not PROGRESS.match(line)]
-
-    def fault(self, bad: Bad) -> str:
-        """What is wrong with the answer; empty where nothing is."""
-        if self.code not in bad.codes:
-            return f"exit code {self.code}: {(self.err or self.out)[-600:]}"
-        if self.code == 2:
-            if len(self.lines) != 1 or not self.lines[0].startswith("workbench: "):
-                return f"no one line: {self.err[-600:]}"
-            if bad.says.lower() not in self.lines[0].lower():
-                return f'does not say "{bad.says}": {self.lines[0][:600]}'
-            if len(self.lines[0]) > 1500:
-                return f"a line of {len(self.lines[0])} characters: {self.lines[0][:200]}"
-            if "out of memory" in self.lines[0]:
-                return f"takes too much memory: {self.lines[0]}"
-        if self.code == 1 and bad.says.lower() not in (self.out + self.err).lower():
-            return f'does not say "{bad.says}": {self.out[-600:]}'
-        if "Traceback" in self.err + self.out or "internal error" in self.err:
-            return f"traceback: {self.err[-600:]}"
-        if self.grown and self.megabytes > LARGEST_MB:
-            return f"takes {self.megabytes:.0f} MB"
-        if self.seconds > LONGEST_S:
-            return f"takes {self.seconds:.0f} s"
-        return ""
-
-
-def lay(place: Path, files: Mapping[str, Content]) -> None:
-    for name, content in files.items():
-        path = place / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if callable(content):
-            content(path)
-        elif isinstance(content, bytes):
-            path.write_bytes(content)
-        else:
-            path.write_text(content, encoding="utf-8")
-
-
-def prepare(good: Path) -> Callable[[tuple[str, tuple[str, ...]]], Answer]:
-    """Begin a worker: what it needs is imported, and *good* stands for a finished run."""
-    import workbench.cli  # noqa: F401
-
-    return partial(call, good)
-
-
-def call(good: Path, task: tuple[str, tuple[str, ...]]) -> Answer:
-    """Call the command line in a directory."""
-    place, arguments = task
-    from workbench.cli import _run
-
-    os.chdir(place)
-    out, err = io.StringIO(), io.StringIO()
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-    begun = time.monotonic()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        try:
-            code = _run(list(arguments))
-        except SystemExit as stop:
-            code = stop.code if isinstance(stop.code, int) else 1
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-    return Answer(code, out.getvalue(), err.getvalue(), time.monotonic() - begun, peak, peak > before + 1)
-
 
 # --- campaigns --------------------------------------------------------------------------------------------------------
 
@@ -458,12 +356,5 @@ def options() -> Iterator[Bad]:
         )
 
 
-def copy_of(good: Path, place: Path) -> None:
-    shutil.copytree(good, place)
-
-
 def all_bad(model: str) -> list[Bad]:
     return [*campaigns(), *motions(), *models(model), *formulas(), *options()]
-
-
-__all__ = ["Answer", "Any", "Bad", "all_bad", "copy_of", "lay", "prepare"]

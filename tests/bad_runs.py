@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from bad_inputs import HUGE, Bad, Content, directory, fifo, itself
+from bad_inputs import HUGE, directory, fifo, itself
+from judged_call import Bad, Content
 
 JUNK: dict[str, Any] = {
     "null": None, "true": True, "minus one": -1, "text": "x", "a list in a list": [[]], "a table": {"a": 1}, "1e308": 1e308,

@@ -10,14 +10,16 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 import pytest
 
-from bad_inputs import ADDRESSES_MB, LONGEST_S, SMALL, Answer, Bad, all_bad, lay, prepare
+from bad_inputs import SMALL, all_bad
 from bad_runs import bad_runs
+from judged_call import HANGS_S, LARGEST_MB, Answer, Bad, lay, prepare
 from stored_pictures import store_pictures
 from workbench.sweep.supervisor import Lost, Supervisor
 
@@ -44,7 +46,7 @@ def table(good: Path, repository: Path) -> list[Bad]:
 
 
 def faults(cases: Sequence[Bad], good: Path, root: Path) -> list[str]:
-    """Try the cases one after the other; say what is wrong with the answers."""
+    """Try the cases one after the other; say what is wrong with the answers, and print what they took."""
     tasks = []
     for number, case in enumerate(cases):
         place = root / str(number)
@@ -53,8 +55,9 @@ def faults(cases: Sequence[Bad], good: Path, root: Path) -> list[str]:
             shutil.copytree(good, place / name)
         lay(place, case.files)
         tasks.append((number, (str(place), case.arguments)))
-    found = []
-    supervisor = Supervisor(1, partial(prepare, good), LONGEST_S, ADDRESSES_MB, 0)
+    found, answers = [], {}
+    setup = partial(prepare, Path(__file__).resolve().parents[1])
+    supervisor = Supervisor(1, setup, HANGS_S + 30.0, 3 * LARGEST_MB, 0)
     try:
         for number, answer in supervisor.run(iter(tasks)):
             case = cases[number]
@@ -64,10 +67,26 @@ def faults(cases: Sequence[Bad], good: Path, root: Path) -> list[str]:
                 fault = f"leaves {left}"
             if fault:
                 found.append(f"{case.name}: {fault}")
+            if isinstance(answer, Answer):
+                answers[case] = answer
             shutil.rmtree(root / str(number), ignore_errors=True)
     finally:
         supervisor.close()
+    print(figures(answers))
     return found
+
+
+def figures(answers: Mapping[Bad, Answer]) -> str:
+    """How many ended how, by kind, and what took most."""
+    lines = []
+    kinds = {case: case.name.partition(":")[0].split()[0] for case in answers}
+    for kind in dict.fromkeys(kinds.values()):
+        codes = Counter(answer.code for case, answer in answers.items() if kinds[case] == kind)
+        lines.append(f"{kind:12} {codes.total():4}  " + ", ".join(f"exit {c}: {n}" for c, n in sorted(codes.items())))
+    for what, most in (("seconds", lambda a: a.seconds), ("megabytes", lambda a: a.megabytes)):
+        worst = sorted(answers, key=lambda case: most(answers[case]), reverse=True)[:3]
+        lines.append(f"most {what}: " + "; ".join(f"{most(answers[case]):.1f} ({case.name[:60]!a})" for case in worst))
+    return "\n".join(lines)
 
 
 def test_there_are_many_of_every_kind(table: list[Bad]) -> None:
@@ -90,11 +109,12 @@ def test_each_gives_one_line(table: list[Bad], good: Path, tmp_path: Path) -> No
 def test_the_judge_sees_every_fault() -> None:
     bad = Bad("x", ("run",), {}, "bad.toml")
     line = "workbench: bad.toml: no\n"
-    fine = Answer(2, "", line, 1.0, 100.0, True)
+    fine = Answer(2, "", line, 1.0, 100.0)
     assert fine.fault(bad) == ""
     for code, err, seconds, megabytes in (
-        (0, line, 1.0, 100.0), (3, line, 1.0, 100.0), (2, line + line, 1.0, 100.0), (2, "", 1.0, 100.0),
-        (2, "workbench: other.toml\n", 1.0, 100.0), (2, line, 61.0, 100.0), (2, line, 1.0, 9000.0),
+        (0, line, 1.0, 100.0), (-9, line, 1.0, 100.0), (3, line, 1.0, 100.0),
+        (2, line + line, 1.0, 100.0), (2, "", 1.0, 100.0), (2, "workbench: other.toml\n", 1.0, 100.0),
+        (2, line, 61.0, 100.0), (2, line, 1.0, 9000.0),
         (2, "Traceback (most recent call last)\n", 1.0, 100.0), (2, "workbench: bad.toml: " + "x" * 2000, 1.0, 100.0),
     ):  # fmt: skip
-        assert Answer(code, "", err, seconds, megabytes, True).fault(bad)
+        assert Answer(code, "", err, seconds, megabytes).fault(bad)

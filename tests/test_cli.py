@@ -45,7 +45,7 @@ def test_a_run_from_outside(tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SMALL)
     done = process(tmp_path, "run", "small.toml", "--only", "first")
     assert done.returncode == 0, done
-    assert "PASSED: 6 checks in 1 case" in done.stdout
+    assert "PASSED: all 6 checks in 1 case hold their bounds" in done.stdout
     assert done.stdout.rstrip().endswith("Report: reports/small/report.html")
     assert done.stderr == "[1/1] first\n"
     assert {path.name for path in (tmp_path / "reports/small").iterdir()} >= {

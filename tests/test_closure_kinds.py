@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from nullspace_oracle import NullSpaceOracle
 from own_mechanisms import FOURBAR
@@ -31,6 +32,7 @@ SAME = {
     "weld by sites without torque": '<weld site1="tip" site2="pin" torquescale="0"/>',
     "an inactive one beside it": '<weld body1="rod" active="false"/>' + BY_SITES,
 }
+APART = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="slide"/><joint type="ball"/>'
 SETUP = Setup(("crank",), "tip")
 
 
@@ -71,6 +73,46 @@ def test_a_weld_by_bodies_keeps_its_relative_pose(tmp_path: Path) -> None:
     assert np.abs(found - expected).max() < AGREE * np.abs(expected).max()
     stale = apart.replace('relpose="0.2', 'relpose="0.21')
     assert np.abs(torque(tmp_path, stale, setup, 1.0) - expected).max() > 1e-4
+
+
+@pytest.mark.parametrize("relpose", ["0.2 0 0 1 0 0 0", "0.2 0.01 -0.02 0.8 0.3 0.4 0.33166247903554"])
+def test_a_weld_holds_all_turns_wherever_the_mechanism_points(tmp_path: Path, relpose: str) -> None:
+    """A four-bar whose last link is welded of two halves, tilted in space together with gravity: the same torques."""
+    halves = FOURBAR.replace('<site name="tip" pos="0.3 0 0"/>', "").replace(
+        "</worldbody>",
+        f'<body name="half" pos="0.5 0 0.1">{APART}<inertial pos=".01 .02 0" mass=".1" diaginertia="2e-3 1e-3 3e-3"/>'
+        '<site name="tip"/></body>'
+        # held by its weld alone, so that no other loop makes up for a turn that is not held
+        f'<body name="rider">{APART}<inertial pos="0 .1 0" mass=".2" diaginertia="2e-3 1e-3 3e-3"/></body></worldbody>',
+    )
+    place, turn = np.split(np.array([float(word) for word in relpose.split()]), [3])
+    # where the rocker ends, seen from the half that is welded to it
+    end = Rotation.from_quat(np.roll(turn, -1)).inv().apply(np.array([0.3, 0.0, 0.0]) - place)
+    halves = halves.replace('<site name="tip"/>', f'<site name="tip" pos="{" ".join(map(repr, end.tolist()))}"/>')
+
+    def weld(one: str, two: str) -> str:
+        return f'<weld body1="{one}" body2="{two}" relpose="{relpose}"/>'
+
+    apart = halves.replace("<equality>", f"<equality>{weld('rocker', 'half')}{weld('coupler', 'rider')}")
+    setup = Setup(("crank",), "coupler", initial=(("crank", 1.0), ("elbow", -0.5), ("wrist", -1.5)))
+    tilt = [0.4, -0.7, 1.1]
+    pull = Rotation.from_euler("XYZ", tilt).apply([0.0, 0.0, -9.81])
+    turned = (
+        apart.replace("<option>", f'<option gravity="{" ".join(map(repr, pull.tolist()))}">')
+        .replace("<worldbody>", f'<worldbody><body euler="{" ".join(map(str, tilt))}">')
+        .replace("</worldbody>", "</body></worldbody>")
+    )
+    found = []
+    for name, text in (("straight", apart), ("turned", turned)):
+        path = tmp_path / f"{name}.xml"
+        path.write_text(text, encoding="utf-8")
+        q = np.linspace(0.6, 1.4, 5)[:, None]
+        found.append(MujocoReference(path, setup=setup).inverse_dynamics(q, 2 + 0 * q, 3 + 0 * q))
+    straight, tilted = found
+    assert np.abs(straight.tau - tilted.tau).max() < AGREE * np.abs(straight.tau).max()
+    for one in found:
+        assert one.acceleration_residual.max() < 1e-10
+        assert one.rank.tolist() == [14] * 5
 
 
 GEARS = """<mujoco><compiler angle="radian"/><option><flag contact="disable"/></option><worldbody>
@@ -149,9 +191,6 @@ def stewart(joints: str) -> str:
         )
         loops += f'<connect body1="plate" body2="l{k}" anchor="{" ".join(repr(float(v)) for v in corner)}"/>'
     return PLATFORM.format(legs=legs, joints=joints, loops=loops)
-
-
-APART = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="slide"/><joint type="ball"/>'
 
 
 def test_a_platform_on_a_free_joint_that_loops_hold(tmp_path: Path) -> None:

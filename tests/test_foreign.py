@@ -20,7 +20,13 @@ from workbench.foreign.octave import octave_program
 
 needs_octave = pytest.mark.skipif(octave_program() is None, reason="Octave is not installed (octave-cli)")
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler (cc) is installed")
-both = pytest.mark.parametrize("suffix", [pytest.param("m", marks=needs_octave), pytest.param("c", marks=needs_cc)])
+needs_r = pytest.mark.skipif(shutil.which("Rscript") is None, reason="R is not installed (Rscript)")
+LANGUAGES = [
+    pytest.param("m", marks=needs_octave),
+    pytest.param("c", marks=needs_cc),
+    pytest.param("R", marks=needs_r),
+]
+every = pytest.mark.parametrize("suffix", LANGUAGES)
 
 PLACES = {"asym_2rss_ppap": (0.02, 0.03, 0.4), "planar_4rprp": (0.26, 0.25, 0.3)}
 
@@ -57,7 +63,7 @@ def loaded() -> object:
 Load = Callable[[Path], ForeignCandidate]
 
 
-@both
+@every
 @pytest.mark.parametrize("name", PLACES)
 def test_the_papers_formulas_give_what_the_closed_forms_give(
     name: str, suffix: str, repository: Path, tmp_path: Path, loaded: Load
@@ -70,6 +76,7 @@ def test_the_papers_formulas_give_what_the_closed_forms_give(
     assert formula.registration.bound == 1e-10
     # twin: one sign of the formula's source spoiled shows
     spoiled = tmp_path / path.name
+    shutil.copy(path.with_name("exchange.R"), tmp_path)
     text = path.read_text(encoding="utf-8")
     mistake = {"asym_2rss_ppap": "- common", "planar_4rprp": "- z .* zd" if suffix == "m" else "- z * zd"}[name]
     assert mistake in text
@@ -77,7 +84,7 @@ def test_the_papers_formulas_give_what_the_closed_forms_give(
     assert np.abs(loaded(spoiled)(robot, q, qd, qdd, force) - wanted).max() > 1e-3 * np.abs(wanted).max()
 
 
-@both
+@every
 def test_a_campaign_shows_the_same_table_for_every_language(suffix: str, repository: Path, tmp_path: Path) -> None:
     folder = repository / "examples" / "languages"
     files = [folder / "rrr.py", folder / f"rrr.{suffix}"]
@@ -113,6 +120,30 @@ def test_a_fault_in_octave_is_reported_with_its_line(
     assert said in str(error.value)
     assert "\n" not in str(error.value)
     assert f"wrong.m:{line})" in str(error.value), str(error.value)
+
+
+@needs_r
+@pytest.mark.parametrize(
+    ("body", "line", "said"),
+    [
+        ("x <- 1\ntorque <- function(a) {\n  a * undefined_thing\n}\ntorque(2)", 3, "'undefined_thing' not found"),
+        ("x <- 1\ny <- nowhere + a_rather_long_name_that_makes_the_message_run_over", 2, "'nowhere' not found"),
+        ("x <- 1\ny <- )", 2, "unexpected ')'"),
+        ("files <- commandArgs(trailingOnly = TRUE)\nstop('no such branch')", None, "no such branch"),
+    ],
+)
+def test_a_fault_in_r_is_reported_with_its_line(
+    body: str, line: int | None, said: str, repository: Path, tmp_path: Path, loaded: Load
+) -> None:
+    robot, q, qd, qdd, force = samples("planar_4rprp", repository)
+    path = tmp_path / 'a "folder"' / "wrong.R"
+    path.parent.mkdir()
+    path.write_text(body + "\n", encoding="utf-8")
+    with pytest.raises(CandidateError) as error:
+        loaded(path)(robot, q, qd, qdd, force)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+    assert (f"wrong.R:{line})" if line else "(wrong.R)") in str(error.value), str(error.value)
 
 
 C_HEAD = (

@@ -153,7 +153,7 @@ def test_its_unspoiled_twin_passes(name: str, workbench: Workbench) -> None:
     done = workbench.run(campaign(FAULTS[name]))
     assert done.code == 0, done
     assert failures(workbench.directory) == {}
-    assert "\nPASSED: 6 checks in 2 cases" in done.out
+    assert "\nPASSED: all 6 checks in 2 cases" in done.out
 
 
 def test_a_candidate_that_gives_nan_fails(workbench: Workbench, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -24,12 +25,46 @@ def test_what_it_writes_runs_at_once(workbench: Workbench, joints: tuple[str, ..
     done = workbench("new", "mine", *options, "--loops", str(len(joints)))
     assert done.code == 0, done.err
     done = workbench("run", "mine/mine.toml", "--candidates", "mine/mine.py", "--out", "out")
-    assert done.code == 0, done.err
+    assert done.code == 4, done.err  # the sketch has no bound: nothing is judged
     run = wb.load_run("out")
     assert run.manifest.joints == joints
     assert run.manifest.cases["first"].mobility == len(joints)
     assert run.manifest.cases["first"].evidence.power_balance["distributed"].relative < 1e-8
     assert 0 < run.summary["peak_error"].max() < 10
+
+
+def test_its_robot_has_parameters_and_stays_whole_when_one_is_set(workbench: Workbench) -> None:
+    assert workbench("new", "mine", "--actuated", "left", "--actuated", "right").code == 0
+    done = workbench("model", "set", "mine", "b=0.5", "--out", "mine/long.xml")
+    assert done.code == 0, done.err
+    changed = Path("mine/long.xml").read_text().splitlines()
+    assert sum('fromto="0 0 0 0.5 0 0"' in line for line in changed) == 2
+    assert sum('pos="0.25 0 0"' in line for line in changed) == 2
+    for number, model in (("by_set", ()), ("by_file", ("--model", "mine/long.xml"))):
+        change = model or ("--set", "b=0.5")
+        command = ("run", "mine/mine.toml", "--candidates", "mine/mine.py", "--quick", "--out", number)
+        done = workbench(*command, *change)
+        assert done.code == 4, done.err
+    by_set, by_file = (wb.load_run(name).series("first") for name in ("by_set", "by_file"))
+    assert by_set.filter(like="ref_").equals(by_file.filter(like="ref_"))
+
+
+RUNS = {"octave": "octave-cli", "c": "cc", "r": "Rscript", "program": "awk"}
+
+
+@pytest.mark.parametrize("language", RUNS)
+def test_a_beginning_in_another_language_gives_what_the_python_one_gives(workbench: Workbench, language: str) -> None:
+    if shutil.which(RUNS[language]) is None:
+        pytest.skip(f"{RUNS[language]} is not installed")
+    done = workbench("new", "mine", "--actuated", "left", "--actuated", "right", "--language", language)
+    assert done.code == 0, done.err
+    (other,) = Path("mine").glob(f"mine_{language}*")
+    done = workbench("run", "mine/mine.toml", "--candidates", "mine/mine.py", "--candidates", str(other), "--out", "o")
+    assert done.code == 0, done.err
+    errors = wb.load_run("o").summary.pivot(index="joint", columns="candidate", values="peak_error")
+    (name,) = [column for column in errors if column.startswith("mine") and column != "mine"]
+    assert (errors[name] - errors["mine"]).abs().max() < 1e-12
+    assert errors["mine"].min() > 1e-3
 
 
 def test_the_test_that_it_writes_passes_and_can_fail(workbench: Workbench) -> None:

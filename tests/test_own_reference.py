@@ -42,6 +42,13 @@ def test_the_file_need_name_nothing(single: MujocoReference) -> None:
     assert found.acceleration_residual.max() < 1e-12
 
 
+@pytest.mark.parametrize("rate", [1e150, 1e200, 1e308])
+def test_rates_beyond_all_arithmetic_are_refused(single: MujocoReference, rate: float) -> None:
+    """Loops that close at no speed that a number can hold: an error, never an infinite torque or NaN."""
+    with pytest.raises(MotionError, match=r"^sample 1, joint \w+: "):
+        single.inverse_dynamics([[0.5], [0.5]], [[1.0], [rate]], [[0.0], [0.0]])
+
+
 def test_torques_of_excess_actuators_have_least_norm_and_do_the_same_work(
     tmp_path: Path, single: MujocoReference
 ) -> None:
@@ -59,6 +66,32 @@ def test_torques_of_excess_actuators_have_least_norm_and_do_the_same_work(
     assert np.abs(found.tau - alone).max() > 0.1
     balance = power_balance(two, q, qd, qdd, "distributed", np.zeros((len(q), 3)))
     assert balance.relative < 1e-9
+
+
+def test_dry_friction_of_each_excess_actuator_is_its_own(tmp_path: Path, single: MujocoReference) -> None:
+    crank, wrist, elbow = 0.7, 0.4, 0.3
+
+    def rubbing(**joints: float) -> MujocoReference:
+        text = FOURBAR
+        for name, loss in joints.items():
+            text = text.replace(f'<joint name="{name}"', f'<joint name="{name}" frictionloss="{loss}"')
+        return reference(tmp_path, text, ("crank", "wrist"), initial=GUESS)
+
+    one = whole_turn(single)
+    motion = one.qpos[:, [0, 2]], one.qvel[:, [0, 2]], one.qacc[:, [0, 2]]
+    qd = motion[1]
+    ways = np.where(np.abs(qd) > 1e-9, np.sign(qd), 0.0)
+    assert {-1.0, 1.0} <= set(ways[:, 1]), "the wrist turns back on the way"
+    smooth = rubbing().inverse_dynamics(*motion).tau
+    rough = rubbing(crank=crank, wrist=wrist)
+    added = rough.inverse_dynamics(*motion).tau - smooth
+    assert np.abs(added - ways * [crank, wrist]).max() < 1e-13
+    assert power_balance(rough, *motion).relative < 1e-9
+    # friction of a passive joint is work for both, shared like any other
+    shared = rubbing(elbow=elbow).inverse_dynamics(*motion).tau - smooth
+    work = elbow * np.abs(one.qvel[:, 1])
+    assert np.abs((shared * qd).sum(axis=1) - work).max() < 1e-13
+    assert np.abs(shared - qd * (work / (qd**2).sum(axis=1))[:, None]).max() < 1e-13
 
 
 @pytest.mark.parametrize("which", [0, 1, 2])
@@ -83,6 +116,18 @@ def test_a_parallelogram_driven_at_both_cranks_shares_the_load_evenly(tmp_path: 
     # weight of two cranks at half their length and of the coupler at the whole, on both motors
     expected = 9.81 * 0.2 * np.cos(q[:, 0]) * (0.3 + 0.8) / 2
     assert np.abs(tau[:, 0] - expected).max() < 1e-12
+
+
+@pytest.mark.parametrize("rate", [0.0, 2.0])
+def test_a_parallelogram_laid_flat_is_refused_even_at_rest(tmp_path: Path, rate: float) -> None:
+    """Flat, it may go on as an antiparallelogram: the loops close to rounding there, and determine nothing."""
+    one = reference(tmp_path, PARALLELOGRAM, ("left",), initial=(("left", 1.0), ("right", 1.0), ("hinge", -1.0)))
+    q = np.array([[0.5], [0.0]])
+    for short in (0.5, 1e-3):  # a thousandth short of it all is well
+        near = one.inverse_dynamics([[short]], [[rate]], [[0.0]])
+        assert np.abs(near.qpos - [short, -short, short]).max() < 1e-12
+    with pytest.raises(MotionError, match=r"^sample 1, joint (hinge|right): singular pose at left = 0;"):
+        one.inverse_dynamics(q, np.full_like(q, rate), 0 * q)
 
 
 ROD = '<geom type="capsule" fromto="0 0 0 .5 0 0" size=".01" mass=".5"/>'

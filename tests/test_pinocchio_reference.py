@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import workbench as wb
-from robots import MODEL, motion_inside, peak_error, random_changes
+from robots import MODEL, FourBar, motion_inside, peak_error, random_changes, write_model
 from workbench.errors import ArrayError, MissingExtraError, ModelError, MotionError, ParameterError
 from workbench.reference import pinocchio_loops, pinocchio_reader
 from workbench.reference.pinocchio_reference import PinocchioReference
@@ -346,6 +346,26 @@ def test_a_far_sample_stays_on_the_branch_of_the_home_pose(
     monkeypatch.setattr(pinocchio_loops, "LONGEST_STEP", np.inf)
     monkeypatch.setattr(pinocchio_loops, "CORRECTION", np.inf)
     assert peak_error(PinocchioReference(MODEL).inverse_dynamics(sample, still, still).tau, expected) > 0.1
+
+
+@needs_pinocchio
+@pytest.mark.parametrize("guard", ["", "CORRECTION", "LONGEST_STEP"])
+def test_branches_that_nearly_meet_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, guard: str) -> None:
+    """As in test_reference_closure.py: either guard alone is not enough."""
+    if guard:
+        monkeypatch.setattr(pinocchio_loops, guard, np.inf)
+    wrong = 0
+    q = np.random.default_rng(1).uniform(-6.0, 6.0, 25)
+    for branch in (1, -1):
+        model = FourBar(branch)
+        model.coupler, model.rocker = 0.20007, 0.2
+        loop = '<connect name="loop" site1="coupler_tip" site2="rocker_tip"/>'
+        second = PinocchioReference(write_model(tmp_path, model.bodies(), loop, home=model.home()))
+        expected = model.poses(q)[:, 3, :2]
+        for i in range(len(q)):
+            x = second.inverse_dynamics(q[i : i + 1, None], np.zeros((1, 1)), np.zeros((1, 1))).x[0, [0, 2]]
+            wrong += bool(np.linalg.norm(x - expected[i]) > 1e-9)
+    assert wrong > 3 if guard else wrong == 0
 
 
 @needs_pinocchio

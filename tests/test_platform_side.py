@@ -203,6 +203,30 @@ def test_marked_poses_are_those_of_the_closed_form() -> None:
         assert np.abs(values - found.measures[name][near]).max() < 1e-9
 
 
+@pytest.mark.parametrize("name", ["asym_2rss_ppap", "planar_4rprp"])
+def test_a_refused_pose_names_the_last_in_reach_on_the_way_to_it(name: str) -> None:
+    """It can be reached, all before it on the straight way too, and what comes next cannot."""
+    robot = wb.load_robot(name)
+    start, generator = robot.forward_kinematics(robot.home), np.random.default_rng(8)
+    refused = 0
+    for _ in range(20):
+        far = start + generator.uniform(-0.8, 0.8, 3)
+        try:  # inverse kinematics alone do not tell the other assembly branch, which `reach` leaves out
+            robot.inverse_kinematics(far)
+        except MotionError as error:
+            told, nearest = str(error), np.array(error.facts["nearest"])
+        else:
+            continue
+        refused += 1
+        assert "the straight way from the home pose ends at x = " in told
+        robot.inverse_kinematics(nearest)
+        beyond = nearest + 1e-6 * (far - start)
+        assert not robot.reach(beyond[None, :]).reachable[0]
+        assert np.linalg.norm(np.cross(nearest - start, far - start)) < 1e-12
+        assert (robot.reach(start + np.linspace(0, 1, 50)[:, None] * (nearest - start)).reachable).all()
+    assert refused > 5
+
+
 def test_closeness_vanishes_in_singular_poses(tmp_path: Path) -> None:
     reference, _, _ = robot("fivebar", tmp_path)
     # symmetric: cranks 0.2 at (-+0.1, 0), bars 0.3; stretched arms reach (0, z) with z^2 + 0.1^2 = 0.5^2

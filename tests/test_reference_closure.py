@@ -12,7 +12,7 @@ import workbench as wb
 from robots import MODEL, FourBar, sine_sum, table_1, write_model
 from workbench.capabilities.robot import Robot
 from workbench.errors import ModelError, MotionError
-from workbench.reference import ReferenceResult
+from workbench.reference import ReferenceResult, continuation
 
 SAME = 1e-12
 CONNECT = '<connect name="loop" site1="coupler_tip" site2="rocker_tip"/>'
@@ -85,6 +85,25 @@ def test_one_sample_asked_for_alone_is_where_it_is_among_others(tmp_path: Path) 
     fresh = four_bar(tmp_path)
     for i in (0, 17, 60):
         assert np.abs(at_rest(fresh, q[i : i + 1]).qpos - together.qpos[i]).max() < SAME
+
+
+@pytest.mark.parametrize("guard", ["", "CORRECTION", "LONGEST_STEP"])
+def test_branches_that_nearly_meet_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, guard: str) -> None:
+    """A tenth of a millimetre parts the branches where all bars are in line; every sample is reached past that."""
+    if guard:
+        monkeypatch.setattr(continuation, guard, np.inf)
+    wrong = 0
+    q = np.random.default_rng(1).uniform(-6.0, 6.0, 25)
+    for branch in (1, -1):
+        model = FourBar(branch)
+        model.coupler, model.rocker = 0.2001, 0.2
+        path = write_model(tmp_path, model.bodies(), CONNECT, home=model.home())
+        expected = model.poses(q)[:, 3, :2]
+        for i in range(len(q)):  # each alone, so that none is a stone to step on for another
+            x = at_rest(wb.MujocoReference(path), q[i : i + 1, None]).x[0, [0, 2]]
+            wrong += bool(np.linalg.norm(x - expected[i]) > 1e-9)
+    # the twin: without either guard a step ends on the other branch, closed to rounding
+    assert wrong > 3 if guard else wrong == 0
 
 
 # --- what cannot be closed --------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from workbench.reference.kernels import keep_if_better
 from workbench.reference.linear import factor, least_squares, solve_transposed
 
 TOLERANCE = 1e-11  # rounding of a factor with condition number up to about 100
@@ -122,3 +123,17 @@ def test_not_a_number_is_no_rank() -> None:
     mixed = np.array([[1.0, np.nan], [0.0, 1.0]])
     x, rank, _ = least_squares(mixed, np.ones(2))
     assert rank < 2 or np.isnan(x).any()
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_residual_that_is_no_number_closes_nothing(place: int) -> None:
+    """NaN compares as false with everything; a closure step must neither keep such a pose nor go on from it."""
+    limits = (1e-13, 1e-15, 1e3, False)
+    residual, kept, best = np.full(3, 1e-14), np.full(2, 7.0), np.array([np.inf])
+    residual[place] = np.nan
+    again, closed = keep_if_better(residual, limits, np.array([1.0, 2.0]), kept, best, 0)
+    assert (again, closed, best[0], kept.tolist()) == (False, False, np.inf, [7.0, 7.0])
+    # the twin: the same without it is kept, closed, and gets one more step
+    residual[place] = 1e-14
+    again, closed = keep_if_better(residual, limits, np.array([1.0, 2.0]), kept, best, 0)
+    assert (again, closed, best[0], kept.tolist()) == (True, True, 1e-14, [1.0, 2.0])

@@ -407,7 +407,7 @@ def test_worst_rows_come_first(tmp_path: Path) -> None:
     assert "FAILED" in second[-1]
     assert "passed" in third[-1]
     modelling = tables["worst-modelling"]
-    assert modelling[0][3:] == ["q1 [N]", "q2 [N·m]", "q3 [N·m]", "Verdict"]
+    assert modelling[0][3:] == ["τ1 [N]", "τ2 [N·m]", "τ3 [N·m]", "Verdict"]
     assert len(modelling) == 1 + 2
     text = (folder / "report.html").read_text(encoding="utf-8")
     assert "2 of 24 checks exceed their bound" in text
@@ -429,10 +429,10 @@ def test_verdicts_differ_in_words_and_style(tmp_path: Path) -> None:
     assert len({(status.symbol, status.text) for status, _ in seen.values()}) == 3
     assert seen["passed"][1].startswith("all 24 checks in 2 cases hold their bounds; worst is ")
     assert seen["failed"][1].startswith(
-        "1 of 24 checks exceed their bound (worst is lumped on joint q1 in case sim1: 1.02e+00"
+        "1 of 24 checks exceed their bounds (worst is lumped on joint q1 in case sim1: 1.02e+00"
     )
     assert seen["other"][1] == "1 case failed for another reason (sim1)."
-    assert seen["error"][1].startswith("1 of 3 cases could not be computed (broken); the 24 checks that were made hold")
+    assert seen["error"][1].startswith("1 of 3 cases could not be computed (broken); all 24 checks in 2 cases hold")
 
 
 def test_declared_failures_are_told_from_failures(tmp_path: Path) -> None:
@@ -606,7 +606,7 @@ def test_plots_tell_the_script_their_scales(run: Path) -> None:
     drawings = {str(attributes["aria-label"])[:30]: attributes for tag, attributes in parse(run).tags if tag == "svg"}
     panels = json.loads(str(drawings["Case sim1, joint q2: force or "]["data-panels"]))
     assert [panel["log"] for panel in panels] == [False, True]
-    assert panels[0]["name"] == "q2 [N·m]"
+    assert panels[0]["name"] == "τ2 [N·m]"
     assert panels[0]["curves"] == list(CANDIDATES)
     assert len(panels[1]["curves"]) == len(PAIRS)
     low, high = panels[0]["x"]

@@ -54,7 +54,7 @@ def test_parts_are_stacked_from_zero_and_their_sum_is_the_torque(run: Run) -> No
         torque = series[f"ref_distributed_{joint}"]
         (line,) = axes.get_lines()
         assert np.allclose(line.get_ydata(), torque, atol=1e-12)
-        assert joint in axes.get_ylabel()
+        assert f"τ{joint.removeprefix('q')} [" in axes.get_ylabel()
         assert unit.split()[0] in axes.get_ylabel()
         bands = [c for c in axes.collections if isinstance(c, PolyCollection)]
         assert len(bands) == 2 * len(SHARES)

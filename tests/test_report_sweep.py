@@ -81,7 +81,7 @@ def test_a_good_sweep_passes_and_says_how_near_it_came(tmp_path: Path) -> None:
     [
         ({"passed": 299, "timeout": 1}, "error"),
         ({"passed": 298, "killed": 1, "failed": 1}, "failed"),
-        ({"filtered": 300}, "undecided"),
+        ({"filtered": 300}, "unjudged"),
         ({"passed": 1, "filtered": 299}, "passed"),
         ({"passed": 299, "invalid": 1}, "error"),
     ],
@@ -97,7 +97,7 @@ def test_without_a_bound_nothing_is_verified(tmp_path: Path) -> None:
     def edit(manifest: Any, summary: Any, cases: Any, rows: pd.DataFrame) -> None:
         rows["bound"] = np.nan
 
-    assert verdict(loaded(make_sweep(tmp_path / "run", good=True, edit=edit)))[0].key == "undecided"
+    assert verdict(loaded(make_sweep(tmp_path / "run", good=True, edit=edit)))[0].key == "unjudged"
 
 
 # --- the numbers ---

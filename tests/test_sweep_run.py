@@ -215,8 +215,32 @@ def test_only_what_changed_is_computed_again(workbench: Workbench, calm: Path) -
     assert (manifest(calm)["computed"], manifest(calm)["title"]) == (0, "Another title")
     assert workbench.run(FEW.replace("1e-9", "2e-9"), "--out", "calm").code == 0
     assert manifest(calm)["computed"] == 10
-    assert workbench.run(FEW, "--out", "calm", "--set", "m3=1.5").code == 0
+    # another robot takes the place of a finished sweep when asked, and not before
+    before = listing(calm)
+    refused = workbench.run(FEW, "--out", "calm", "--set", "m3=1.5")
+    assert refused.code == 2
+    assert "--replace" in refused.complaint[0]
+    assert listing(calm) == before
+    assert workbench.run(FEW, "--out", "calm", "--set", "m3=1.5", "--replace").code == 0
     assert manifest(calm)["computed"] == 10
+    assert not list(calm.parent.glob(".calm.before"))
+
+
+def test_the_earlier_sweep_stands_until_the_one_in_its_place_is_finished(
+    workbench: Workbench, calm: Path, inline: type[Inline], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = listing(calm)
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("workbench.sweep.files.write_parts", full)
+        assert workbench.run(FEW, "--out", "calm", "--set", "m3=1.5", "--replace").code == 2
+    assert listing(calm.parent / ".calm.before") == before
+    # the same command goes on, and then the earlier one goes
+    assert workbench.run(FEW, "--out", "calm", "--set", "m3=1.5", "--replace").code == 0
+    assert not (calm.parent / ".calm.before").exists()
 
 
 def test_a_model_saved_while_the_sweep_runs(
@@ -256,9 +280,9 @@ def test_a_model_saved_while_the_sweep_runs(
 def test_nothing_but_cases_left_out_proves_nothing(workbench: Workbench, inline: type[Inline]) -> None:
     nothing = FEW.replace("offset = [0.0,", "offset = [0.5,")
     done = workbench.run(nothing, "--out", "run")
-    assert done.code == 1
-    assert "FAILED: 10 filtered, of 10 cases." in done.out
-    assert manifest(workbench.directory / "run")["status"] == "failed"
+    assert done.code == 4
+    assert "NOTHING JUDGED: all 10 cases were left out by the filter" in done.out
+    assert manifest(workbench.directory / "run")["status"] == "nothing-judged"
 
 
 def test_fresh_starts_over(workbench: Workbench, calm: Path) -> None:

@@ -1,7 +1,7 @@
 """The command line: parse, call, print.
 
-Exit code 0: every bound holds; 1: a bound fails; 2: bad input; 3: a fault of the workbench itself; 130: interrupted;
-143, 129: ended by SIGTERM, SIGHUP.
+Exit code 0: every bound holds; 1: a bound fails; 2: bad input; 3: a fault of the workbench itself; 4: nothing was held
+against a bound; 130: interrupted; 143, 129: ended by SIGTERM, SIGHUP.
 """
 
 from __future__ import annotations

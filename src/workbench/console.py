@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -17,7 +15,17 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from workbench.campaign.changed import Change, sentences
 from workbench.campaign.compare import Row
+from workbench.campaign.conclusion import (
+    FAILED,
+    INCOMPLETE,
+    NOTHING_JUDGED,
+    PASSED,
+    UNDECIDED_RUN,
+    Conclusion,
+)
+from workbench.campaign.not_driven import NOT_DRIVEN
 from workbench.campaign.run import Outcome
 from workbench.campaign.verdict import (
     AGREES,
@@ -31,6 +39,7 @@ from workbench.campaign.verdict import (
     MODELLING,
     PASS,
     RECORDED,
+    UNBOUNDED,
     UNDECIDED,
     UNEXPECTED_PASS,
     VERIFICATION,
@@ -59,6 +68,13 @@ STYLES = {
     DIFFERS: "yellow", PASS: "green", AGREES: "green", MEASURED: "cyan",
 }  # fmt: skip
 """Colour of each verdict; a row of the table shows the first of them that one of its joints has."""
+
+
+CONCLUSIONS = {
+    PASSED: "bold green", FAILED: "bold red", UNDECIDED_RUN: "bold magenta", INCOMPLETE: "bold yellow",
+    NOTHING_JUDGED: "bold cyan",
+}  # fmt: skip
+"""Colour of each verdict on a run: green where every bound holds, and nowhere else."""
 
 
 class _Bar:
@@ -123,10 +139,12 @@ class Steps(_Bar):
 def print_outcome(outcome: Outcome) -> None:
     """Print the table of errors, the claims, the verdict and where the report lies."""
     manifest = outcome.manifest
+    print_changes(manifest)
     tables = (
         (VERIFICATION, "Verification: closed form against MuJoCo, same masses", _scientific),
         (EXPECTED_FAILURE, "Declared failures: what each mistake costs, joint by joint", _percent),
-        (MODELLING, "Modelling error: what the simpler mass model costs", _percent),
+        (MODELLING, "Modelling error: what another mass model than the reference's costs", _percent),
+        (UNBOUNDED, "Measured, nothing judged: formulas without a bound against MuJoCo, same masses", _percent),
         (RECORDED, "Measured or simulated elsewhere: recorded torques against MuJoCo, as found by error", _percent),
         (CONTRAST, "For contrast: MuJoCo's inverse dynamics without projection", _percent),
     )
@@ -139,19 +157,23 @@ def print_outcome(outcome: Outcome) -> None:
     out.print(Text("Each error is max|tau - tau_ref| / max|tau_ref| of that joint over the case."), style="dim")
     _print_kinematics(manifest["cases"])
     for name, case in manifest["cases"].items():
+        if case["status"] == NOT_DRIVEN:
+            out.print(Text(f"cannot be driven: {case['message']}", style="yellow"), soft_wrap=True)
         for warning in case["warnings"]:
             out.print(Text(f'warning: case "{name}": {warning}'), style="yellow")
     refuted = [claim for claim in manifest["claims"] if claim["holds"] is False]
     if manifest["claims"]:
         held = sum(claim["holds"] is True for claim in manifest["claims"])
-        undecided = len(manifest["claims"]) - held - len(refuted)
+        others = sum(bool(claim["not_about"]) for claim in manifest["claims"])
+        undecided = len(manifest["claims"]) - held - len(refuted) - others
         counts = [f"{held} confirmed", f"{len(refuted)} not confirmed", f"{undecided} cannot be decided"]
+        counts.append(f"{others} not about this robot")
         out.print(Text(f"Claims: {', '.join(c for c in counts if not c.startswith('0 '))}."))
     for claim in refuted:
         measured, claimed = _quantity(claim["measured"], claim["unit"]), _quantity(claim["claimed"], claim["unit"])
         out.print(Text(f"  not confirmed: {claim['text']}: measured {measured}, printed {claimed} ({claim['source']})"))
     _print_diagnosis(manifest.get("diagnosis", {}))
-    out.print(_verdict(outcome))
+    print_conclusion(outcome.conclusion)
     out.print(Text(f"Report: {outcome.directory / 'report.html'}"), soft_wrap=True)
 
 
@@ -199,28 +221,19 @@ def _print_diagnosis(diagnosis: dict[str, Any]) -> None:
         out.print(Text(f"  {found['command']}", style="dim"), soft_wrap=True)
 
 
-def _verdict(outcome: Outcome) -> Text:
-    cases = outcome.manifest["cases"]
-    verdicts = Counter(row.verdict for row in outcome.rows)
-    checks, declared = (
-        verdicts[PASS] + verdicts[FAIL] + verdicts[UNDECIDED],
-        verdicts[EXPECTED_FAIL] + verdicts[UNEXPECTED_PASS],
-    )
-    if outcome.passed:
-        worst = max((row.peak_error for row in outcome.rows if row.verdict == PASS), default=math.nan)
-        within = f"{checks} checks in {len(cases)} {'case' if len(cases) == 1 else 'cases'} within their bounds"
-        parts = [f"{within}; largest error {worst:.2g}"] if checks else []
-        parts += [f"{declared} declared failures seen"] if declared else []
-        return Text(f"PASSED: {'; '.join(parts) or 'nothing to judge'}.", style="bold green")
-    parts = [f"{verdicts[FAIL]} of {checks} checks beyond their bounds"] if verdicts[FAIL] else []
-    if verdicts[UNDECIDED]:
-        parts.append(
-            f"{verdicts[UNDECIDED]} undecided: the reference's own uncertainty is not below a tenth of the bound"
-        )
-    if verdicts[UNEXPECTED_PASS]:
-        parts.append(f"{verdicts[UNEXPECTED_PASS]} of {declared} declared failures did not happen")
-    names = ", ".join(name for name, case in cases.items() if case["status"] != "passed")
-    return Text(f"FAILED: {'; '.join([*parts, f'cases: {names}'])}.", style="bold red")
+def print_changes(manifest: Mapping[str, Any]) -> None:
+    """Print what was changed of the robot that the campaign's claims are about."""
+    changes = manifest["changes"]
+    said = sentences(changes["model"], [Change(**one) for one in changes["parameters"]], list(manifest["cases"]))
+    if said:
+        out.print(Text("Another robot than the one that the campaign is about:", style="bold yellow"))
+    for line in said:
+        out.print(Text(f"  {line}"), soft_wrap=True)
+
+
+def print_conclusion(found: Conclusion) -> None:
+    """Print the verdict on a run, in the colour of its status."""
+    out.print(Text(found.text, style=CONCLUSIONS[found.status]), soft_wrap=True)
 
 
 def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any) -> Table:

@@ -10,6 +10,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.campaign.motion_spec import MAX_SAMPLES, RecordedMotion
+from workbench.campaign.not_driven import NotDriven, with_nearest_joints
 from workbench.campaign.planned import formula_of, planned_motion
 from workbench.campaign.recorded import read_torques, recorded_motion, records_of
 from workbench.campaign.recorded_spec import RecordedSpec
@@ -59,6 +60,7 @@ def resolve_cases(
     settings: Mapping[str, float] | None = None,
     relative: Sequence[str] = (),
     users: Sequence[UserCandidate] = (),
+    left_out: Callable[[NotDriven], object] | None = None,
 ) -> list[Case]:
     """Resolve every case: parameters (campaign, case, command line), model, motion, candidates.
 
@@ -76,6 +78,8 @@ def resolve_cases(
         Changes like ``a2*=1.1``, each from what the parameter then is in the case.
     users
         Candidates of the user's own.
+    left_out
+        Called with each case that cannot be driven; None refuses the first.
 
     Raises
     ------
@@ -101,6 +105,7 @@ def resolve_cases(
     for spec in campaign.case:
         if only and spec.name not in only:
             continue
+        overrides: dict[str, float] = {}
         try:
             overrides = table.layered(campaign.parameters, spec.parameters, settings or {})
             if relative:
@@ -108,14 +113,17 @@ def resolve_cases(
                 overrides = table.layered(overrides, resolve_changes(table, before.values, relative))
             robot = robot_once(overrides)
             _check_candidates(campaign, robot)
-            case = _resolve(spec, file, path, overrides, robot)
+            case = _resolve(spec, file, path, overrides, robot, nearest=True)
             records = tuple(
                 (one, read_torques(one, locate(file, one.file, "recorded.file"), robot))
                 for one in records_of(campaign.recorded, spec.name, names, str(file))
             )
             cases.append(replace(case, records=records))
         except WorkbenchError as error:
-            raise _in_case(error, file, spec.name) from error
+            named = _in_case(error, file, spec.name)
+            if left_out is None or not isinstance(named, MotionError):
+                raise named from error
+            left_out(NotDriven(spec, named, overrides))
     return cases
 
 
@@ -250,7 +258,9 @@ def _in_case(error: WorkbenchError, file: Path, case: str) -> WorkbenchError:
     return type(error)(f"{prefix}{error}", **facts)
 
 
-def _resolve(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float], robot: Robot) -> Case:
+def _resolve(
+    spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float], robot: Robot, nearest: bool = False
+) -> Case:
     for joint in spec.bounds:
         if joint not in robot.joints:
             raise SpecError(f'bounds: no joint "{joint}"{did_you_mean(joint, robot.joints)}')
@@ -267,6 +277,8 @@ def _resolve(spec: CaseSpec, file: Path, model: Path, overrides: dict[str, float
         if robot.closed_form is not None:  # else the reference has just computed these torques
             robot.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
     except MotionError as error:
+        if nearest and isinstance(planned, JointMotion):
+            error = with_nearest_joints(error, robot, planned.q)
         raise with_unit_hint(at_time(error, planned.t), robot) from error
     force = np.tile(np.array(spec.external_force), (len(motion.t), 1))
     return Case(spec, model, overrides, robot, motion, force, x, xd, xdd)

@@ -225,6 +225,8 @@ def _rows(
 ) -> list[Row]:
     rows = []
     reaction = largest_reaction(reference.reactions.values())
+    known = case.robot.candidates.get(candidate.name)
+    mass_model = known.mass_model if known else candidate.reference
     for i, joint in enumerate(case.robot.joints):
         error = joint_error(tau[:, i], reference.tau[:, i], reaction)
         uncertainty = evidence.uncertainty(candidate.reference, joint)
@@ -241,7 +243,7 @@ def _rows(
                 worst_time_s=float(case.motion.t[error.worst_index]),
                 bound=judged.bound,
                 verdict=verdict_of(judged, case.name, joint, error.peak_error, uncertainty),
-                kind=kind_of(candidate),
+                kind=kind_of(candidate, mass_model),
                 unit=case.robot.force_units[i],
                 peak_reference=error.peak_reference,
                 pointwise_skipped=error.pointwise_skipped,

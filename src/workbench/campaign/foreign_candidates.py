@@ -93,7 +93,7 @@ class ForeignCandidate(UserCandidate):
             begun = time.perf_counter()
             found = self._formula(robot.values, (q, qd, qdd, force), robot.joints, LIMIT_S)
         except ForeignError as fault:
-            where = f"{self.file.name}:{fault.line or self.line}" if fault.line or self.line else self.file.name
+            where = f"{self.file.name}:{fault.line}" if fault.line else self.where
             raise CandidateError(
                 f'candidate "{self.name}" ({where}) {fault}', candidate=self.name, line=where
             ) from fault

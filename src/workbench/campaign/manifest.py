@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.campaign import provenance
+from workbench.campaign.changes import Changes
 from workbench.campaign.commit import git_commit
 from workbench.campaign.spec import Campaign
 from workbench.capabilities.robot import Robot
@@ -18,8 +19,12 @@ def shown(path: Path, campaign_file: Path) -> str:
     return found.relative_to(above).as_posix() if found.is_relative_to(above) else path.name
 
 
-def describe(campaign: Campaign, file: Path, model: Path, robot: Robot) -> dict[str, Any]:
-    """Return the keys that stand in the manifest of every run, with or without a sweep."""
+def describe(campaign: Campaign, file: Path, model: Path, robot: Robot, case: str, changes: Changes) -> dict[str, Any]:
+    """Return the keys that stand in the manifest of every run, with or without a sweep.
+
+    *robot* is that of *case*, whose parameters are listed; *changes* says in what it is another than its sources'.
+    """
+    sources = changes.sources(case)
     values = robot.values
     return {
         "campaign": campaign.name,
@@ -40,9 +45,16 @@ def describe(campaign: Campaign, file: Path, model: Path, robot: Robot) -> dict[
         "platform_axes": list(robot.platform_axes),
         "mobility_count": robot.mobility_count(),
         "parameters": [
-            {"name": name, "value": values[name], "unit": info.unit, "meaning": info.meaning, "source": info.source}
+            {
+                "name": name,
+                "value": values[name],
+                "unit": info.unit,
+                "meaning": info.meaning,
+                "source": sources.get(name, info.source),
+            }
             for name, info in robot.description.table.infos.items()
         ],
+        "changes": changes.facts(),
         "versions": provenance.versions(),
         "machine": provenance.machine(),
         "git_commit": git_commit(file.resolve().parent),

@@ -34,7 +34,7 @@ FINE = 1e-3
 """Of the peak torque: what agreement should be worth where no bound is given."""
 
 ALARM = 1.5
-"""Widths of the band from which on torques differ: rounding is no Gaussian noise, and a false alarm costs days."""
+"""Widths of the band from which on torques differ: one joint in twenty leaves the band, and false alarms cost days."""
 
 NOISE_DRAWN_FROM = 24
 """Samples of torques; fewer say nothing of their own noise."""
@@ -89,7 +89,7 @@ def recorded_motion(spec: RecordedMotion, path: Path, robot: Robot) -> Estimated
         raise MotionError(f"{path}: {len(found.t)} samples")
     try:
         smoothed = tuple(
-            smooth(found.t, column, written.sigma) for column, written in zip(found.q.T, found.written_q, strict=True)
+            smooth(found.t, column, written.half) for column, written in zip(found.q.T, found.written_q, strict=True)
         )
     except MotionError as error:
         raise MotionError(f"{path}: {error}", **error.facts) from error
@@ -249,7 +249,7 @@ def _noise(record: Record) -> FloatArray:
         return np.array([written.sigma for written in record.written_tau])
     return np.array(
         [
-            smooth(record.t, column, written.sigma).sigma
+            smooth(record.t, column, written.half).sigma
             for column, written in zip(record.tau.T, record.written_tau, strict=True)
         ]
     )

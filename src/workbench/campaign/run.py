@@ -13,27 +13,37 @@ from typing import Any, Protocol
 
 from workbench.campaign import store
 from workbench.campaign.cases import Case, resolve_cases, with_unit_hint
+from workbench.campaign.changes import IN_CAMPAIGN, Changes, Variant, changes_of
 from workbench.campaign.claims import judge_claims
 from workbench.campaign.compare import RAW_DESCRIPTION, RAW_INVERSE, CaseResult, Row, compute_case
+from workbench.campaign.conclusion import CaseOutcome, Conclusion, case_status, conclude
 from workbench.campaign.cost import cost_us
 from workbench.campaign.evidence import FULL, Effort, check_engines
+from workbench.campaign.figure_spec import FigureSpec
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
+from workbench.campaign.not_driven import NotDriven
+from workbench.campaign.replacing import refuse_loss, request_of
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.campaign.user_candidates import Formula, UserCandidate, load_candidates, with_rows
 from workbench.campaign.verdict import FAIL, VERIFICATION
-from workbench.errors import OutputError, SpecError, WorkbenchError
+from workbench.errors import MotionError, OutputError, SpecError, WorkbenchError
 from workbench.staging import check_output, staged
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A finished run: where it lies, whether every bound holds, and the rows."""
+    """A finished run: where it lies, the verdict on it, and the rows."""
 
     directory: Path
-    passed: bool
+    conclusion: Conclusion
     rows: list[Row]
     manifest: dict[str, Any]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every bound holds; not where nothing was held against one."""
+        return self.conclusion.passed
 
 
 class Pictures(Protocol):
@@ -76,6 +86,8 @@ def run_campaign(
     candidates: Sequence[Formula] = (),
     pick: Pick | None = None,
     explain: Explain | None = None,
+    keep_going: bool = False,
+    replace: bool = False,
 ) -> Outcome:
     """Run a campaign and write its run directory.
 
@@ -109,6 +121,10 @@ def run_campaign(
         Makes a campaign of named cases from one with a sweep, `workbench.sweep.pick.pick_cases`.
     explain
         Says what is wrong with a formula that fails its verification, `workbench.diagnosis.brief.brief`.
+    keep_going
+        Record cases that cannot be driven, each with the nearest pose that can, and compute the others.
+    replace
+        Put the run in the place of an earlier one that holds what this one does not: other cases, another robot.
 
     Raises
     ------
@@ -124,14 +140,22 @@ def run_campaign(
         else Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
     )
     users = load_candidates(candidates)
+    own = {candidate.name for candidate in campaign.candidate}
     campaign = with_rows(campaign, users)
     if campaign.sweep:
         if not only or pick is None:
             raise SpecError(f"{file}: has a sweep; workbench.sweep.run.run_sweep runs it")
         campaign = pick(campaign, file, model, settings or {}, only, users)
     check_output(directory, store.RUN)
+    request = request_of(model, settings or {}, relative, only, candidates)
+    if not replace:
+        names = [case.name for case in campaign.case if not only or case.name in only]
+        refuse_loss(directory, campaign.name, request, names, {candidate.name for candidate in campaign.candidate})
     check_engines(effort.engines)
-    cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users)
+    missing: list[NotDriven] = []
+    left_out = missing.append if keep_going else None
+    cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users, left_out)
+    _refuse_none(cases, missing)
     results: list[CaseResult] = []
     with (
         locked(directory),
@@ -141,27 +165,41 @@ def run_campaign(
         for number, case in enumerate(cases):
             if progress:
                 progress(case.name, number, len(cases))
-            results.append(compute_named_case(campaign, case, file, effort))
-            store.write_series(stage, case.name, results[-1].series)
-            if pictures and number == 0:
-                pictures.start(results[0])
+            try:
+                result = compute_named_case(campaign, case, file, effort)
+            except MotionError as error:
+                if not keep_going:
+                    raise
+                missing.append(NotDriven(case.spec, error, case.overrides))
+                continue
+            results.append(result)
+            store.write_series(stage, case.name, result.series)
+            if pictures and len(results) == 1:
+                pictures.start(result)
         if progress:
             progress("", len(cases), len(cases))
+        cases = [case for case in cases if case.name in {result.name for result in results}]
+        _refuse_none(cases, missing)
         rows = [row for result in results for row in result.rows]
-        facts = {result.name: result.facts for result in results}
-        passed = all(f["status"] == "passed" for f in facts.values())
-        manifest = _manifest(campaign, file, cases, facts, rows) | {
+        found = {result.name: _judged(result) for result in results} | {m.spec.name: m.facts() for m in missing}
+        facts = {case.name: found[case.name] for case in campaign.case if case.name in found}
+        conclusion = conclude(rows, {name: _outcome(said) for name, said in facts.items()})
+        variants = [Variant(case.name, case.robot, case.spec.parameters) for case in cases]
+        changes = changes_of(campaign, file, model, settings or {}, relative, variants)
+        manifest = _manifest(campaign, file, cases, facts, rows, changes, own) | {
             "command": shlex.join(command),
+            "request": request,
             "started": started.isoformat(timespec="seconds"),
             "finished": datetime.now(UTC).isoformat(timespec="seconds"),
             "seconds": round(time.perf_counter() - clock, 3),
-            "status": "passed" if passed else "failed",
+            "status": conclusion.status,
+            "verdict": conclusion.sentence,
             "engines": list(effort.engines),
             "budget": effort.budget,
         }
         if explain:
             manifest["diagnosis"] = _explained(cases, rows, path, candidates, explain)
-        store.write_summary(stage, rows)
+        store.write_summary(stage, rows, [case.name for case in cases if changes.why_not(case.name)])
         store.write_manifest(stage, manifest)
         if pictures:
             pictures.finish(stage)
@@ -173,7 +211,35 @@ def run_campaign(
             f" {said.replace(str(stage), str(directory))}; workbench report {directory} tries again",
             path=str(directory),
         ) from failure
-    return Outcome(directory, passed, rows, manifest)
+    return Outcome(directory, conclusion, rows, manifest)
+
+
+def _figure(figure: FigureSpec, changes: Changes) -> dict[str, Any]:
+    """A figure, with the reason where it is not drawn for the robot that its source shows."""
+    over = figure.kind == "error_over"  # its cases differ on purpose
+    reasons = [changes.why_not(case, IN_CAMPAIGN if over else ()) for case in figure.needs]
+    return figure.model_dump() | {"not_about": next((why for why in reasons if why), "")}
+
+
+def _refuse_none(cases: Sequence[Case], missing: Sequence[NotDriven]) -> None:
+    """Refuse a run of which not one case can be driven: it would hold nothing."""
+    if not cases and missing:
+        count = f"none of {len(missing)} cases can be driven; the first: " if len(missing) > 1 else ""
+        raise MotionError(f"{count}{missing[0].error}", **missing[0].error.facts)
+
+
+def _judged(result: CaseResult) -> dict[str, Any]:
+    """A case's facts; it did not pass where nothing was judged."""
+    verdicts = [row.verdict for row in result.rows] + [*_kinematics(result.facts)]
+    return result.facts | {"status": case_status(result.facts["status"], verdicts)}
+
+
+def _outcome(facts: Mapping[str, Any]) -> CaseOutcome:
+    return CaseOutcome(facts["status"], _kinematics(facts))
+
+
+def _kinematics(facts: Mapping[str, Any]) -> list[str]:
+    return [check["verdict"] for check in facts.get("kinematics_checks", ())]
 
 
 def _explained(
@@ -219,12 +285,18 @@ def compute_named_case(campaign: Campaign, case: Case, file: Path, effort: Effor
 
 
 def _manifest(
-    campaign: Campaign, file: Path, cases: list[Case], facts: Mapping[str, Mapping[str, Any]], rows: list[Row]
+    campaign: Campaign,
+    file: Path,
+    cases: list[Case],
+    facts: Mapping[str, Mapping[str, Any]],
+    rows: list[Row],
+    changes: Changes,
+    own: set[str],
 ) -> dict[str, Any]:
-    robot = cases[0].robot
+    robot, computed = cases[0].robot, {case.name for case in cases}
     candidates = {c.name: robot.candidates[c.name] for c in campaign.candidate}
     printed = {c.name: c.printed_cost for c in campaign.candidate if c.printed_cost}
-    return describe(campaign, file, cases[0].model, robot) | {
+    return describe(campaign, file, cases[0].model, robot, cases[0].name, changes) | {
         "format": store.FORMAT,
         "candidates": {
             name: {
@@ -237,7 +309,7 @@ def _manifest(
             for name, c in candidates.items()
         }
         | ({RAW_INVERSE: RAW_DESCRIPTION} if any(row.candidate == RAW_INVERSE for row in rows) else {}),
-        "claims": judge_claims(campaign, rows, facts),
-        "figures": [kept.model_dump() for figure in campaign.figure if (kept := figure.among(set(facts)))],
+        "claims": judge_claims(campaign, own, rows, facts, {case.name: case.robot for case in cases}, changes),
+        "figures": [_figure(kept, changes) for figure in campaign.figure if (kept := figure.among(computed))],
         "cases": dict(facts),
     }

@@ -88,6 +88,8 @@ class ClaimSpec(Strict):
     """for ``value``: half of the last printed digit"""
     unit: str
     measure: Measure
+    parameters: dict[str, Finite] = Field(default_factory=dict)
+    """of the robot that the claim is about, where they are not those of the robot's file or source"""
     note: str = ""
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -41,9 +41,13 @@ def write_series(stage: Path, case: str, columns: Mapping[str, FloatArray]) -> N
     (folder / f"{case}.parquet").write_bytes(content)
 
 
-def write_summary(stage: Path, rows: list[Row]) -> None:
-    """Write ``summary.csv``; floats in their shortest form that reads back bit-equal."""
+def write_summary(stage: Path, rows: list[Row], changed: Collection[str] = ()) -> None:
+    """Write ``summary.csv``; floats in their shortest form that reads back bit-equal.
+
+    *changed* names the cases whose robot is not the one that the campaign's claims and sources are about.
+    """
     frame = pd.DataFrame([dataclasses.asdict(row) for row in rows], columns=[f.name for f in dataclasses.fields(Row)])
+    frame["robot"] = ["changed" if row.case in changed else "published" for row in rows]
     frame.to_csv(stage / SUMMARY, index=False, lineterminator="\n")
 
 

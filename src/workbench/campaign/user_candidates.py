@@ -65,7 +65,7 @@ class UserCandidate:
     @property
     def where(self) -> str:
         """``my_model.py:12``, the line where the function, with its decorators, begins."""
-        return f"{self.file.name}:{self.line}"
+        return f"{self.file.name}:{self.line}" if self.line else self.file.name
 
     @property
     def takes_force(self) -> bool:

@@ -27,6 +27,9 @@ FAILURES = frozenset({FAIL, UNEXPECTED_PASS, UNDECIDED})
 
 VERIFICATION = "verification"
 MODELLING = "modelling"
+"""a formula against a reference of another mass model than its own, without a bound"""
+UNBOUNDED = "unbounded"
+"""a formula against the reference of its own mass model, without a bound: nobody says how good it has to be"""
 EXPECTED_FAILURE = "expected-failure"
 RECORDED = "recorded"
 """torques that were measured or simulated elsewhere"""
@@ -38,10 +41,10 @@ SHARE = 0.1
 """A verdict counts only where the reference's uncertainty is below this share of the bound or error that it judges."""
 
 
-def kind_of(candidate: CandidateSpec) -> str:
-    """Return what the rows of a candidate are: a verification, a modelling error, or a declared failure."""
+def kind_of(candidate: CandidateSpec, mass_model: str) -> str:
+    """Return what the rows of a candidate are, which makes an assumption about masses of its own, *mass_model*."""
     if candidate.bound is None:
-        return MODELLING
+        return UNBOUNDED if mass_model == candidate.reference else MODELLING
     return EXPECTED_FAILURE if candidate.expect_fail else VERIFICATION
 
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from workbench.arrays import FloatArray, as_batch
 from workbench.capabilities.identity import RobotIdentity
 from workbench.capabilities.limits import reach_box
+from workbench.capabilities.nearest import with_nearest
 from workbench.capabilities.samples import one_or_many
 from workbench.capabilities.warnings import (
     millimetre_warnings,
@@ -20,7 +21,7 @@ from workbench.capabilities.warnings import (
     reference_warnings,
     refuse_degrees,
 )
-from workbench.errors import ParameterError
+from workbench.errors import MotionError, ParameterError
 from workbench.reference import MujocoReference
 from workbench.reference.task import continuous, task_motion, task_of
 from workbench.robots.closed_form import Candidate, ClosedForm, Condition, Reach
@@ -84,6 +85,11 @@ class Robot(RobotIdentity):
     def values(self) -> Mapping[str, float]:
         """The parameters by name, SI."""
         return dict(self._values)
+
+    @property
+    def file_values(self) -> Mapping[str, float]:
+        """The parameters as the model's file has them, before any change, SI."""
+        return dict(self._base.loaded.values or {})
 
     def with_parameters(self, **changes: float) -> Robot:
         """Return a new robot with some parameters changed.
@@ -210,13 +216,33 @@ class Robot(RobotIdentity):
         Further arguments are those of the robot's own closed form, such as the branch of each elbow.
         """
         own = self._own("inverse_kinematics")
-        return own(x, *branch, **named) if own else self.reference.inverse_kinematics(x, self.coordinates)
+        if not own:
+            return self.reference.inverse_kinematics(x, self.coordinates)
+        try:
+            found: FloatArray = own(x, *branch, **named)
+        except MotionError as error:
+            raise (error if branch or named else self._out_of_reach(error, x)) from None
+        return found
 
     @one_or_many(3)
     def joint_motion(self, x: ArrayLike, xd: ArrayLike, xdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Actuated position, velocity and acceleration, each ``(n, na)``, from a motion in task coordinates."""
         own = self._own("joint_motion")
-        return own(x, xd, xdd) if own else self.reference.joint_motion(x, xd, xdd, self.coordinates)
+        if not own:
+            return self.reference.joint_motion(x, xd, xdd, self.coordinates)
+        try:
+            found: tuple[FloatArray, FloatArray, FloatArray] = own(x, xd, xdd)
+        except MotionError as error:
+            raise self._out_of_reach(error, x) from None
+        return found
+
+    def _out_of_reach(self, error: MotionError, x: ArrayLike) -> MotionError:
+        """The same error with the last pose in reach on the way to the one that it refuses, where that is known."""
+        reach = self._own("reach")
+        if not reach:
+            return error
+        home = self.forward_kinematics(self.home[None, :])[0]
+        return with_nearest(error, as_batch("x", x), home, reach)
 
     def reach(self, x: ArrayLike) -> Reach:
         """Inverse kinematics that marks poses out of reach instead of refusing them; x ``(n, m)``."""

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from workbench.compare.runs import Difference
 
 WORSE = 1
+NOTHING_COMPARED = 4
 LONGEST_VALUE = 26
 """Characters of a value that a table shows."""
 
@@ -28,7 +29,8 @@ def compare(
 ) -> None:
     """Say what changed from one run to another: parameters, versions, campaign, and every error.
 
-    Exit code 0: nothing got worse; 1: an error grew by more than the factor, or a verdict turned; 2: bad input.
+    Exit code 0: nothing got worse; 1: an error grew by more than the factor, or a verdict turned; 2: bad input; 4: the
+    runs have no error in common, so nothing is compared.
     """
     from rich.text import Text
 
@@ -57,6 +59,9 @@ def compare(
     if worse:
         out.print(Text(f"WORSE: {len(worse)} by more than a factor of {factor:g}, or by verdict.", style="bold red"))
         raise typer.Exit(WORSE)
+    if not found.shared:
+        out.print(Text("NOTHING COMPARED: the runs have no error in common.", style="bold cyan"))
+        raise typer.Exit(NOTHING_COMPARED)
     alone = sum(change.before is None or change.after is None for change in found.errors)
     rest = f"; {alone} errors in one run only" if alone else ""
     out.print(Text(f"OK: nothing got worse by more than a factor of {factor:g}{rest}.", style="bold green"))

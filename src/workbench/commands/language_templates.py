@@ -69,10 +69,26 @@ open(ARGS[3], "w") do io
 end
 """
 
+R = """# The formula that is held against MuJoCo: workbench run {name}.toml --candidates {name}_r.R
+# Called with three names of files: IN.json (parameters), IN.csv (samples), OUT.csv (torques). Needs no package.
+files <- commandArgs(trailingOnly = TRUE)
+pair <- regmatches(json <- readLines(files[1]), regexec('"(.+)": ([-+.0-9eE]+)', json))
+p <- lapply(setNames(sapply(pair, `[`, 3), sapply(pair, `[`, 2)), as.numeric)
+data <- read.csv(files[2])
+column <- function(prefix) as.matrix(data[paste0(prefix, 1:{count})])
+q <- column("q"); qd <- column("qd"); qdd <- column("qdd")
+# to begin with: the driven bars alone, as if nothing hung on them
+tau <- p$m * p$a^2 / 3 * qdd + p$m * p$g * p$a / 2 * cos(q)
+colnames(tau) <- paste0("tau", 1:{count})
+tau[] <- sprintf("%.17g", tau)
+write.csv(tau, files[3], row.names = FALSE, quote = FALSE)
+"""
+
 LANGUAGES = {
     "octave": ("{name}_octave.m", OCTAVE),
     "c": ("{name}_c.c", C),
     "julia": ("{name}_julia.jl", JULIA),
+    "r": ("{name}_r.R", R),
     "program": ("{name}_program", PROGRAM),
 }
 """Language -> name of the file and its text."""

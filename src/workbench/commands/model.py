@@ -53,11 +53,13 @@ def set_(
     """
     from workbench.commands.model_tables import print_edit
     from workbench.reference import MujocoReference
+    from workbench.reference.check import refuse_elsewhere
     from workbench.robots.edit import edit_file
     from workbench.robots.load import LoadedModel
 
     def accept(loaded: LoadedModel) -> None:
         MujocoReference(loaded.file, loaded=loaded)  # raises where it cannot be assembled at home
+        refuse_elsewhere(loaded)
 
     print_edit(edit_file(path, changes, out, in_place, accept))
 

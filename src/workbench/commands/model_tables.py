@@ -51,6 +51,14 @@ def print_edit(result: EditResult) -> None:
     more = f" and {len(result.lines) - LINES_SHOWN} more" if len(result.lines) > LINES_SHOWN else ""
     word = "line" if len(result.lines) == 1 else "lines"
     out.print(Text(f"{result.written}: {len(result.lines)} {word} changed ({lines}{more})"), soft_wrap=True)
+    if result.stale:
+        where = f"line{'s' if len(result.stale) > 1 else ''} {', '.join(map(str, result.stale))}"
+        out.print(
+            Text(f"comments in {where} still name a number as it was before; change them by hand", style="yellow"),
+            soft_wrap=True,
+        )
+    for warning in result.warnings:
+        out.print(Text(f"warning: {warning}", style="yellow"), soft_wrap=True)
 
 
 def print_check(found: ModelCheck, everything: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""``workbench new``: the four files that a mechanism of one's own begins with, which run at once."""
+"""``workbench new``: the folder that a robot of one's own begins with, which runs at once."""
 
 from __future__ import annotations
 
@@ -41,23 +41,81 @@ LOOP = """    <!-- loop {k}: driven bar, coupler, rocker in the plane y = {y}; i
     </body>
 """
 
-CAMPAIGN = """# What moves how, and what is compared: workbench run {name}.toml --candidates {name}.py
+ROBOT = """# What {name}.xml cannot say of itself; the documentation of robots has every key.
 format = 1
 name = "{name}"
 title = "{name}"
 model = "{name}.xml"
 # driven joints, in the order of q and tau
 actuated = [{actuated}]
-# the site whose motion is recorded
-platform_site = "platform1"
+# the site whose motion is recorded; coordinates = ["x", "z"] beside it, as many as the robot has freedoms, and motions
+# of the platform and its workspace can be asked for
+platform = {{ site = "platform1" }}
 # a rough guess (m, rad) from which the loops are closed; it picks the assembly branch
 initial = {{ {initial} }}
+formulas = ["{name}.py"]
 
-# numbers for the formula, read from the compiled model, so that both sides see the same robot
-[read]
-m = "mass bar1"
-a = "offset coupler1 x"
-g = "gravity"
+# Numbers of the robot by name: formulas read them as p.a, `workbench model set` and --set change them at all places.
+[parameters.a]
+at = [{a}]
+meaning = "length of the driven bar"
+allowed = "> 0"
+
+[parameters.b]
+at = [{b}]
+meaning = "length of the coupler"
+allowed = "> 0"
+
+[parameters.c]
+at = [{c}]
+meaning = "length of the rocker"
+allowed = "> 0"
+
+[parameters.d]
+at = [{d}]
+meaning = "distance of the ground pivots"
+allowed = "> 0"
+
+[parameters.m]
+at = [{m}]
+meaning = "mass of the driven bar"
+allowed = "> 0"
+
+[parameters.mb]
+at = [{mb}]
+meaning = "mass of the coupler"
+allowed = "> 0"
+
+[parameters.mc]
+at = [{mc}]
+meaning = "mass of the rocker"
+allowed = "> 0"
+
+[parameters.g]
+at = ["gravity"]
+
+# Each stays one rod of its length when that or its mass is set.
+[[bars]]
+bodies = [{bars}]
+mass = "m"
+length = "a"
+
+[[bars]]
+bodies = [{couplers}]
+mass = "mb"
+length = "b"
+
+[[bars]]
+bodies = [{rockers}]
+mass = "mc"
+length = "c"
+"""
+
+CAMPAIGN = """# What moves how, and what is compared: workbench run {name}.toml --candidates {name}.py
+format = 1
+name = "{name}"
+title = "{name}"
+robot = "robot.toml"
 
 # The formula in {name}.py is a beginning, not yet right: it has no bound. Give it bound = 1e-10 when it should hold.
 [[candidate]]
@@ -111,6 +169,20 @@ def test_{function}(tmp_path):
     assert errors.max() < 10.0  # becomes 1e-10
 '''
 
+PLACES = {
+    "a": ("offset coupler{k} x",),
+    "b": ("offset rocker{k} x", "site platform{k} x = 0.5 * b"),
+    "c": ("site tip{k} x",),
+    "d": ("site ground{k} x",),
+    "m": ("mass bar{k}",),
+    "mb": ("mass coupler{k}",),
+    "mc": ("mass rocker{k}",),
+    "bars": ("bar{k}",),
+    "couplers": ("coupler{k}",),
+    "rockers": ("rocker{k}",),
+}
+"""What stands in the lists of the robot file, once for each loop."""
+
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
 
 
@@ -147,14 +219,16 @@ def new(
     ] = None,
     language: Annotated[
         str | None,
-        typer.Option(metavar="octave|c|julia|program", help="The formula in this language too. Default: Python alone."),
+        typer.Option(
+            metavar="octave|c|julia|r|program", help="The formula in this language too. Default: Python alone."
+        ),
     ] = None,
     source: Annotated[
         Path | None,
         typer.Option("--from", metavar="FILE", help="A robot's MJCF as it lies, or its URDF, in place of a sketch."),
     ] = None,
 ) -> None:
-    """Write a model with closed loops, its campaign, a formula to fill in and a test; they run at once.
+    """Write a model with closed loops, its robot file, a campaign, a formula to fill in and a test; they run at once.
 
     With --from, the robot is a file's: its loops, joints to drive, platform, first guess and a small motion are found.
     A URDF holds a tree: --loops names the table of its loops (.toml, .yaml).
@@ -194,13 +268,18 @@ def new(
         "offset": ", ".join(["1.0"] * count),
         "amplitude": ", ".join(["0.6"] * count),
         "frequency": ", ".join(f"{3.0 + k}" for k in range(count)),
+        **{
+            field: ", ".join(f'"{place.format(k=k)}"' for k in numbers for place in places)
+            for field, places in PLACES.items()
+        },
     }
     directory.mkdir(parents=True, exist_ok=True)
     for file, text in (
-        (f"{name}.xml", MODEL), (f"{name}.toml", CAMPAIGN), (f"{name}.py", CANDIDATE), (f"test_{name}.py", TEST),
+        (f"{name}.xml", MODEL), ("robot.toml", ROBOT), (f"{name}.toml", CAMPAIGN), (f"{name}.py", CANDIDATE),
+        (f"test_{name}.py", TEST),
     ):  # fmt: skip
         (directory / file).write_text(text.format(**fields), encoding="utf-8")
-    typer.echo(f"{directory}: {name}.xml, {name}.toml, {name}.py, test_{name}.py; now\n  cd {directory}")
+    typer.echo(f"{directory}: {name}.xml, robot.toml, {name}.toml, {name}.py, test_{name}.py; now\n  cd {directory}")
     typer.echo(f"  workbench run {name}.toml --candidates {name}.py")
     if language is not None:
         pattern, text = LANGUAGES[language]

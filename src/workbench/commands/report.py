@@ -17,6 +17,7 @@ def report(
     style: Annotated[
         str, typer.Option(metavar="page|paper", help="How figures look: on a page, or in the column of a paper.")
     ] = "page",
+    paper: Annotated[str, typer.Option(metavar="a4|letter", help="Pages of report.pdf.")] = "a4",
 ) -> None:
     """Rebuild the report from what a run has stored; nothing is computed again.
 
@@ -28,7 +29,7 @@ def report(
 
     formats = tuple(dict.fromkeys(format_ or ("html", "md")))
     with Steps("drawing figures") as show:
-        written = build_report(run_dir, formats, style, show)
+        written = build_report(run_dir, formats, style, show, paper)
     for path in written:
         if path.parent in (run_dir, run_dir / "data"):
             typer.echo(str(path))

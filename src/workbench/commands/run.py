@@ -12,8 +12,6 @@ from workbench.commands.assignments import settings
 from workbench.commands.options import CampaignOrNone, OtherModel, SetInCases
 from workbench.errors import SpecError
 
-BOUND_FAILED = 1
-
 
 def run(
     campaign: CampaignOrNone = None,
@@ -21,7 +19,7 @@ def run(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Run directory; an earlier run in it is replaced, a sweep gone on with. Default: reports/NAME.",
+            help="Run directory; an earlier run of the same is replaced, a sweep gone on with. Default: reports/NAME.",
         ),
     ] = None,
     only: Annotated[
@@ -48,6 +46,20 @@ def run(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check everything; print cases, samples, time and disk; write nothing.")
     ] = False,
+    keep_going: Annotated[
+        bool,
+        typer.Option(
+            "--keep-going",
+            help="Record cases that cannot be driven, with the nearest pose that can; run the others, as sweeps do.",
+        ),
+    ] = False,
+    replace: Annotated[
+        bool,
+        typer.Option(
+            "--replace",
+            help="Replace an earlier run of another robot, of other cases or candidates, once this is done.",
+        ),
+    ] = False,
     jobs: Annotated[int | None, typer.Option(min=1, help="Workers of a sweep. Default: one per core.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Start a sweep over; drops what is finished.")] = False,
     retry_failed: Annotated[
@@ -64,7 +76,8 @@ def run(
 ) -> None:
     """Run a campaign: closed forms against MuJoCo, with a table of errors, a verdict and a report.
 
-    Exit code 0: every bound holds; 1: a bound fails or a case of a sweep does not pass; 2: bad input.
+    Exit code 0: every bound holds; 1: a bound fails or cannot be decided, or a case could not be computed; 2: bad
+    input; 4: nothing was held against a bound, so nothing is judged.
     """
     from workbench.campaign.evidence import Effort
     from workbench.campaign.run import run_campaign
@@ -89,7 +102,7 @@ def run(
         return
     if sweep:
         try:
-            passed = run_and_print(
+            code = run_and_print(
                 spec,
                 file,
                 out,
@@ -97,7 +110,7 @@ def run(
                 settings=values,
                 command=command,
                 effort=effort,
-                options=SweepOptions(jobs, scheduler, fresh, retry_failed),
+                options=SweepOptions(jobs, scheduler, fresh, retry_failed, replace),
                 candidates=candidates or (),
                 report=report_apart,
             )
@@ -125,8 +138,10 @@ def run(
                 candidates=candidates or (),
                 pick=pick_cases,
                 explain=brief,
+                keep_going=keep_going,
+                replace=replace,
             )
         print_outcome(outcome)
-        passed = outcome.passed
-    if not passed:
-        raise typer.Exit(BOUND_FAILED)
+        code = outcome.conclusion.exit_code
+    if code:
+        raise typer.Exit(code)

@@ -17,7 +17,7 @@ from rich.text import Text
 from workbench import processes
 from workbench.campaign.evidence import Effort, check_engines
 from workbench.campaign.spec import Campaign
-from workbench.console import err, out
+from workbench.console import err, out, print_changes, print_conclusion
 from workbench.errors import OutputError
 from workbench.sweep.estimate import estimate
 from workbench.sweep.progress import Snapshot
@@ -123,8 +123,8 @@ def run_and_print(
     options: SweepOptions,
     report: Callable[[Path], object],
     candidates: Sequence[str | Path] = (),
-) -> bool:
-    """Run a sweep, write its report and print its outcome; return whether every case passed."""
+) -> int:
+    """Run a sweep, write its report and print its outcome; return the exit code."""
     check_engines(effort.engines)
     with SweepProgress() as progress:
         outcome = run_sweep(
@@ -141,7 +141,7 @@ def run_and_print(
             report=report,
         )
     print_sweep(outcome)
-    return outcome.passed
+    return outcome.conclusion.exit_code
 
 
 def report_apart(directory: Path) -> None:
@@ -165,25 +165,24 @@ def report_apart(directory: Path) -> None:
 def print_sweep(outcome: SweepOutcome) -> None:
     """Print counts, errors over all cases, what drives them, and the verdict."""
     summary = outcome.summary
+    print_changes(outcome.manifest)
     table = Table(title="Errors over all cases, largest joint", title_justify="left", box=box.SIMPLE_HEAD)
     for column in ("candidate", "MuJoCo model", "median", "95 %", "largest", "case"):
         table.add_column(column, justify="right" if column in ("median", "95 %", "largest") else "left")
     for row in summary["errors"]:
         if row["joint"] == "any" and row["cases"]:
-            show = _percent if row["kind"] == "modelling" else _scientific
+            show = _percent if row["kind"] in ("modelling", "unbounded") else _scientific
             numbers = (row["quantiles"]["0.5"], row["quantiles"]["0.95"], row["max"])
             table.add_row(row["candidate"], row["reference"], *map(show, numbers), row["worst_case"])
     out.print(table)
     drivers = summary["drivers"][:SHOWN_DRIVERS]
     if drivers:
         listed = ", ".join(f"{d['key']} {d['rank_correlation']:+.2f}" for d in drivers)
-        out.print(Text(f"Modelling error of {drivers[0]['candidate']} rises with (rank correlation): {listed}"))
+        out.print(Text(f"Error of {drivers[0]['candidate']} rises with (rank correlation): {listed}"))
     for reason in summary["reasons"]:
         if reason["status"] != "filtered" or not summary["counts"]["passed"]:
             out.print(Text(f"{reason['status']} ({reason['cases']}): {reason['example']}"), style="yellow")
-    counts = ", ".join(f"{n} {status}" for status, n in summary["counts"].items() if n)
-    verdict = "PASSED" if outcome.passed else "FAILED"
-    out.print(Text(f"{verdict}: {counts}, of {summary['cases']} cases.", style="green" if outcome.passed else "red"))
+    print_conclusion(outcome.conclusion)
     out.print(Text(f"Report: {outcome.directory / 'report.html'}; data: sweep.json, cases, summary"), soft_wrap=True)
 
 

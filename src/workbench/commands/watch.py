@@ -157,8 +157,8 @@ def _verdict(now: Errors, worse: int) -> object:
         parts.append(f"{len(passed)} within their bounds, largest error {max(passed):.2g}")
     if worse:
         parts.append(f"{worse} worse than before")
-    style = "bold red" if failed else "bold yellow" if worse else "bold green"
-    return Text(f"{_time()} {'; '.join(parts) or 'nothing to judge'}; {now.seconds:.2f} s", style=style)
+    style = "bold red" if failed else "bold yellow" if worse else "bold green" if passed else "bold cyan"
+    return Text(f"{_time()} {'; '.join(parts) or 'nothing judged'}; {now.seconds:.2f} s", style=style)
 
 
 def _time() -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from workbench.campaign.verdict import FAILURES, MODELLING, VERIFICATION
+from workbench.campaign.verdict import FAILURES, MODELLING, UNBOUNDED, VERIFICATION
 from workbench.errors import WorkbenchError
 
 FLOOR = 1e-12
@@ -18,7 +18,7 @@ FACTOR = 10.0
 
 MEASURES = ("peak_error", "rms_error", "pointwise_error")
 
-JUDGED = (VERIFICATION, MODELLING)
+JUDGED = (VERIFICATION, MODELLING, UNBOUNDED)
 """Kinds of rows in which a larger error is worse; declared failures and contrasts are judged by their verdict alone."""
 
 
@@ -105,11 +105,13 @@ def growth_text(factor: float) -> str:
 def match_errors(before: Iterable[Measured], after: Iterable[Measured]) -> list[ErrorChange]:
     """Pair the rows of two runs, in the order of the second; those that only the first has come last."""
     old, new = {_key(row): row for row in before}, {_key(row): row for row in after}
-    return [ErrorChange(*key, old.get(key), new.get(key)) for key in [*new, *(k for k in old if k not in new)]]
+    # what kind a row is may be told otherwise by another version, or by a bound that came or went
+    keys = [*new, *(key for key in old if key not in new)]
+    return [ErrorChange(*key, (new.get(key) or old[key]).kind, old.get(key), new.get(key)) for key in keys]
 
 
-def _key(row: Measured) -> tuple[str, str, str, str, str]:
-    return row.case, row.candidate, row.reference, row.joint, row.kind
+def _key(row: Measured) -> tuple[str, str, str, str]:
+    return row.case, row.candidate, row.reference, row.joint
 
 
 def all_worse(changes: Sequence[ErrorChange], factor: float = FACTOR, floor: float = FLOOR) -> list[str]:

@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from workbench.campaign.changed import few
 from workbench.compare.errors import ErrorChange, match_errors
-from workbench.report.load import load_run
-from workbench.report.manifest import Manifest
+from workbench.compare.parameters import parameter_changes
+from workbench.report.concluded import conclusion_of
+from workbench.report.load import Run, load_run
+from workbench.report.manifest import ClaimRecord, Manifest
 
 MISSING = None
 """Stands for what a run does not have, as in JSON."""
 
 LABELS = ("name", "id")
 """Keys by which entries of a list are told apart, so that an entry put in between does not shift all others."""
+
+CASE = re.compile(r'case ("[^"]*") (.+)')
+"""What says something of one case."""
+
+PARAMETERS = re.compile(r'(case "[^"]*" )?parameters( |$)')
+"""What a campaign says of parameters: the robots' own values are compared instead."""
 
 PROSE = frozenset({"title", "description", "text", "note", "source"})
 """Keys of a campaign that say something and change nothing."""
@@ -39,9 +49,14 @@ class RunComparison:
 
     inputs: tuple[Difference, ...]
     outcomes: tuple[Difference, ...]
-    """status of cases, mobility, claims"""
+    """verdict, status of cases, mobility, claims"""
     errors: tuple[ErrorChange, ...]
     joints: tuple[str, ...]
+
+    @property
+    def shared(self) -> int:
+        """Errors that both runs have: without any there is nothing to compare."""
+        return sum(change.before is not None and change.after is not None for change in self.errors)
 
 
 def compare_runs(before: Path, after: Path) -> RunComparison:
@@ -60,7 +75,7 @@ def compare_runs(before: Path, after: Path) -> RunComparison:
     old, new = load_run(before), load_run(after)
     return RunComparison(
         inputs=tuple(_inputs(old.manifest, new.manifest)),
-        outcomes=tuple(_outcomes(old.manifest, new.manifest)),
+        outcomes=(*_verdicts(old, new), *_once(_outcomes(old.manifest, new.manifest))),
         errors=tuple(match_errors(old.rows, new.rows)),
         joints=new.manifest.joints,
     )
@@ -69,15 +84,37 @@ def compare_runs(before: Path, after: Path) -> RunComparison:
 def _inputs(old: Manifest, new: Manifest) -> Iterator[Difference]:
     for key in ("mechanism", "file", "sha256"):
         yield from differences("model", key, getattr(old.model, key), getattr(new.model, key))
-    names = [{p.name: p.value for p in manifest.parameters} for manifest in (old, new)]
-    yield from differences("parameter", "", *names)
-    shared = [name for name in new.cases if name in old.cases]
-    for name in shared:
-        yield from differences("parameter", f'case "{name}"', old.cases[name].parameters, new.cases[name].parameters)
+    for what, before, after in parameter_changes(old, new):
+        yield Difference("parameter", what, before, after)
     for group, field in (("version", "versions"), ("machine", "machine"), ("campaign", "spec")):
-        yield from differences(group, "", getattr(old, field), getattr(new, field))
+        found = differences(group, "", getattr(old, field), getattr(new, field))
+        yield from _once(one for one in found if not PARAMETERS.search(one.what))
     for field in ("campaign", "engines", "budget", "git_commit"):
         yield from differences("run", field.replace("_", " "), getattr(old, field), getattr(new, field))
+
+
+def _once(found: Iterable[Difference]) -> Iterator[Difference]:
+    """Yield what changed alike in several cases once, with the cases' names."""
+    groups: dict[tuple[str, str, str, str], list[tuple[str, Difference]]] = {}
+    for one in found:
+        match = CASE.match(one.what)
+        case, rest = (match[1], match[2]) if match else ("", one.what)
+        groups.setdefault((one.group, rest if match else f"\n{rest}", repr(one.before), repr(one.after)), []).append(
+            (case, one)
+        )
+    for members in groups.values():
+        first = members[0][1]
+        if len(members) == 1:
+            yield first
+        else:
+            rest = CASE.sub(r"\2", first.what)
+            yield Difference(
+                first.group, f"case {few([case for case, _ in members])} {rest}", first.before, first.after
+            )
+
+
+def _verdicts(old: Run, new: Run) -> Iterator[Difference]:
+    yield from differences("outcome", "verdict", *(conclusion_of(run).word for run in (old, new)))
 
 
 def _outcomes(old: Manifest, new: Manifest) -> Iterator[Difference]:
@@ -88,11 +125,14 @@ def _outcomes(old: Manifest, new: Manifest) -> Iterator[Difference]:
             continue
         for field in ("status", "mobility", "rank", "redundant_rows", "idle_freedoms"):
             yield from differences("outcome", f'case "{name}" {field}', getattr(one, field), getattr(two, field))
-    claims = [{claim.id: _word(claim.holds) for claim in manifest.claims} for manifest in (old, new)]
+    claims = [{claim.id: _word(claim) for claim in manifest.claims} for manifest in (old, new)]
     yield from differences("outcome", "claim", *claims)
 
 
-def _word(holds: bool | None) -> str:
+def _word(claim: ClaimRecord) -> str:
+    if claim.not_about:
+        return "not about this robot"
+    holds = claim.holds
     return "undecided" if holds is None else "holds" if holds else "does not hold"
 
 

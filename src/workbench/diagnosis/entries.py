@@ -47,11 +47,21 @@ class Entry:
 
 
 def compare_parts(
-    formula: Parts, reference: Parts, floors: FloatArray, right: float = RIGHT, nothing: float = NOTHING
+    formula: Parts,
+    reference: Parts,
+    floors: FloatArray,
+    right: float = RIGHT,
+    nothing: float = NOTHING,
+    noise: FloatArray | None = None,
 ) -> list[Entry]:
-    """Hold all parts against the reference's; *floors* ``(na,)`` are the joints' largest parts, N and N m."""
+    """Hold all parts against the reference's.
+
+    *floors* ``(na,)`` are the joints' largest parts, N and N m; *noise* ``(s,)`` is what the formula's own numbers are
+    off by at each pose, as a fraction of them.
+    """
+    own = np.zeros(len(next(iter(reference.values())))) if noise is None else noise
     return [
-        _entry(part, joint, formula[part][:, joint], wanted[:, joint], floors[joint], right, nothing)
+        _entry(part, joint, formula[part][:, joint], wanted[:, joint], floors[joint], right, nothing, own)
         for part, wanted in reference.items()
         if part in formula
         for joint in range(wanted.shape[1])
@@ -59,27 +69,39 @@ def compare_parts(
 
 
 def _entry(
-    part: Part, joint: int, found: FloatArray, wanted: FloatArray, floor: float, right: float, nothing: float
+    part: Part,
+    joint: int,
+    found: FloatArray,
+    wanted: FloatArray,
+    floor: float,
+    right: float,
+    nothing: float,
+    noise: FloatArray,
 ) -> Entry:
     known = np.isfinite(found) & np.isfinite(wanted)
     if not known.any():
         return Entry(part, joint, UNKNOWN_MARK, np.nan, np.nan, None)
     found, wanted = found[known], wanted[known]
+    # where several answers are added up, so are their noises
+    slack = noise[known] * floor * (4.0 if part.kind in (ODD, REST, VISCOUS, DRY) else 1.0)
+    over = float((np.abs(found - wanted) - slack).max())
     gap = float(np.abs(found - wanted).max())
     size = max(float(np.abs(wanted).max()), float(np.abs(found).max()))
     # a difference of two torques that are as large as the joint's largest part carries their rounding
     small = nothing * floor * (100.0 if part.kind in (ODD, REST, VISCOUS, DRY) else 1.0)
     error, weight = (gap / size if size > 0.0 else 0.0), (gap / floor if floor > 0.0 else 0.0)
-    if size <= small:
+    if size <= small + slack.max():
         return Entry(part, joint, NONE_MARK, 0.0, weight, None)
-    if gap <= small or gap <= right * size:
+    if over <= max(small, right * size):
         return Entry(part, joint, RIGHT_MARK, error, weight, Fraction(1))
-    return Entry(part, joint, WRONG_MARK, error, weight, ratio_of(found, wanted, max(small, right * size)))
+    return Entry(part, joint, WRONG_MARK, error, weight, ratio_of(found, wanted, max(small, right * size, slack.max())))
 
 
 def ratio_of(found: FloatArray, wanted: FloatArray, slack: float = 0.0) -> Fraction | float | None:
     """Return found / wanted where it is the same throughout: a simple fraction where it is near one, else a number."""
     power = float(np.vdot(wanted, wanted))
+    if not (np.isfinite(found).all() and np.isfinite(power)):
+        return None
     if np.abs(wanted).max() <= slack or power == 0.0:
         return None
     ratio = float(np.vdot(found, wanted)) / power
@@ -91,6 +113,8 @@ def ratio_of(found: FloatArray, wanted: FloatArray, slack: float = 0.0) -> Fract
 
 def simple(ratio: float) -> Fraction | float:
     """Return the simple fraction that a ratio is, or the ratio itself."""
+    if not np.isfinite(ratio):
+        return ratio
     near = Fraction(ratio).limit_denominator(SIMPLE)
     if abs(float(near) - ratio) < 1e-5 * max(1.0, abs(ratio)) and abs(near.numerator) <= 4 * SIMPLE:
         return near

@@ -35,11 +35,12 @@ def _columns(parts: Parts) -> FloatArray | None:
 
 
 def wrong_jacobian(
-    formula: Parts, reference: Parts, shares: list[Share], joints: tuple[str, ...]
+    formula: Parts, reference: Parts, shares: list[Share], joints: tuple[str, ...], noise: float = 0.0
 ) -> WrongJacobian | None:
     """Tell whether the formula's Jacobian is wrong, and where.
 
     Of a formula that is told the external force J is seen as it is; of others the platform's mass stands for a force.
+    *noise* is what the formula's own numbers are off by, as a fraction of the largest.
     """
     masses = [share for share in shares if share.parameter.kind == MASS]
     ours, theirs = _columns(formula), _columns(reference)
@@ -47,27 +48,28 @@ def wrong_jacobian(
         return _from_masses(masses, joints)
     scale = float(np.abs(theirs).max()) or 1.0
     gap = np.abs(ours - theirs).max(axis=(0, 1)) / scale
-    wrong = tuple(int(j) for j in np.flatnonzero(gap > APART))
+    apart = max(APART, noise)
+    wrong = tuple(int(j) for j in np.flatnonzero(gap > apart))
     if not wrong:
         return None
     if masses and not any(_wrong_weight(share, j) for share in masses for j in wrong):
         return None  # the force itself enters wrongly; where masses hang the Jacobian is right
     if not masses and isinstance(ratio_of(ours.ravel(), theirs.ravel()), Fraction):
         return None
-    return WrongJacobian(wrong, _where(ours, theirs, wrong, joints))
+    return WrongJacobian(wrong, _where(ours, theirs, wrong, joints, apart))
 
 
 def _wrong_weight(share: Share, joint: int) -> bool:
     return any(entry.joint == joint and entry.part == Part(WEIGHT) for entry in share.wrong)
 
 
-def _where(ours: FloatArray, theirs: FloatArray, wrong: tuple[int, ...], joints: tuple[str, ...]) -> str:
+def _where(ours: FloatArray, theirs: FloatArray, wrong: tuple[int, ...], joints: tuple[str, ...], apart: float) -> str:
     names = ", ".join(joints[j] for j in wrong)
     text = (
         f"the platform's velocity per {names}' is wrong (column {', '.join(str(j + 1) for j in wrong)} of J, xd = J qd)"
     )
     for j in wrong:
-        along = _per_pose_ratio(ours[:, :, j], theirs[:, :, j])
+        along = _per_pose_ratio(ours[:, :, j], theirs[:, :, j], apart)
         if along is not None:
             ratio = ratio_of(ours[:, :, j].ravel(), theirs[:, :, j].ravel())
             if ratio is not None:
@@ -78,21 +80,21 @@ def _where(ours: FloatArray, theirs: FloatArray, wrong: tuple[int, ...], joints:
                     f" entry {j + 1} of J_q in J_x xd = J_q qd"
                 )
     if len(wrong) > 1 and ours.shape[1] == ours.shape[2]:
-        text += _rows(ours, theirs, joints)
+        text += _rows(ours, theirs, joints, apart)
     return text
 
 
-def _per_pose_ratio(ours: FloatArray, theirs: FloatArray) -> FloatArray | None:
+def _per_pose_ratio(ours: FloatArray, theirs: FloatArray, apart: float) -> FloatArray | None:
     """``(s,)`` ours / theirs where the two vectors are parallel at every pose, else None."""
     power = (theirs**2).sum(axis=1)
     if not (power > 0.0).all():
         return None
     ratio: FloatArray = (ours * theirs).sum(axis=1) / power
     rest = np.abs(ours - ratio[:, None] * theirs).max()
-    return ratio if rest < APART * float(np.abs(theirs).max()) else None
+    return ratio if rest < apart * float(np.abs(theirs).max()) else None
 
 
-def _rows(ours: FloatArray, theirs: FloatArray, joints: tuple[str, ...]) -> str:
+def _rows(ours: FloatArray, theirs: FloatArray, joints: tuple[str, ...], apart: float) -> str:
     """Rows of the inverse: each belongs to one limb, so a mistake in one limb's equation spoils one row alone."""
     try:
         mine, right = np.linalg.inv(ours), np.linalg.inv(theirs)
@@ -100,11 +102,11 @@ def _rows(ours: FloatArray, theirs: FloatArray, joints: tuple[str, ...]) -> str:
         return "; it is singular"
     size = np.abs(right).max(axis=(0, 2))
     gap = np.abs(mine - right).max(axis=0) / size[:, None]
-    rows = [i for i in range(len(joints)) if gap[i].max() > APART]
+    rows = [i for i in range(len(joints)) if gap[i].max() > apart]
     if len(rows) != 1:
         return ""
     row = rows[0]
-    bad = ", ".join("xyz"[c] for c in np.flatnonzero(gap[row] > APART))
+    bad = ", ".join("xyz"[c] for c in np.flatnonzero(gap[row] > apart))
     return f"; all of it is in the equation of {joints[row]}'s limb (row {row + 1} of J^-1, along {bad})"
 
 

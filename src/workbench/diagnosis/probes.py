@@ -6,24 +6,22 @@ in rates, but for friction. So few states at each pose take it apart exactly, an
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.arrays import FloatArray
 from workbench.diagnosis.subject import Subject
 from workbench.errors import MotionError
+from workbench.reference import MujocoReference
 
 POSES = 40
 SEED = 20100
 MIXED = 3
 """States with all rates, accelerations and forces at once, which must be the sum of what was found apart."""
-
-PATIENCE_S = 5.0
-"""Longest time that a formula which fails on some states is asked state by state; the others stay unknown."""
 
 JITTER = 0.08
 """How far a pose is moved off the motion, as a fraction of the motion's range: so that no two joints go alike."""
@@ -55,9 +53,13 @@ class Plan:
 
     def at(self, poses: int) -> Plan:
         """The same probes at the first few poses."""
+        return self.of(np.arange(min(poses, len(self.poses))))
+
+    def of(self, poses: NDArray[np.int_]) -> Plan:
+        """The same probes at some of the poses, by number."""
         return Plan(
-            self.labels, self.q[:, :poses], self.qd[:, :poses], self.qdd[:, :poses], self.force[:, :poses],
-            self.rates, self.accelerations, self.push, self.poses[:poses],
+            self.labels, self.q[:, poses], self.qd[:, poses], self.qdd[:, poses], self.force[:, poses],
+            self.rates, self.accelerations, self.push, self.poses[poses],
         )  # fmt: skip
 
 
@@ -73,24 +75,34 @@ def choose_poses(subject: Subject, count: int = POSES) -> FloatArray:
     reference = subject.reference({})
     if reference.excess_actuators:
         return np.asarray(picked)
+    if _in_reach(reference, moved):
+        return np.asarray(moved)
     return np.array([_reached(reference, kept, aim) for kept, aim in zip(picked, moved, strict=True)])
 
 
-def _reached(reference: object, kept: FloatArray, aim: FloatArray) -> FloatArray:
+def _in_reach(reference: MujocoReference, poses: FloatArray) -> bool:
+    zero = np.zeros_like(poses)
+    try:
+        reference.inverse_dynamics(poses, zero, zero)
+    except MotionError:
+        return False
+    return True
+
+
+def _reached(reference: MujocoReference, kept: FloatArray, aim: FloatArray) -> FloatArray:
     """The nearest point to *aim*, on the way from a pose of the motion, that is in reach."""
     for share in (1.0, 0.3, 0.1):
         pose = kept + share * (aim - kept)
-        zero = np.zeros_like(pose)[None]
-        try:
-            reference.inverse_dynamics(pose[None], zero, zero)  # type: ignore[attr-defined]
-        except MotionError:
-            continue
-        return np.asarray(pose)
+        if _in_reach(reference, pose[None]):
+            return np.asarray(pose)
     return kept
 
 
-def make_plan(subject: Subject, poses: FloatArray) -> Plan:
-    """Lay out the states: sizes of rates and accelerations are those of the motions, so that parts weigh as there."""
+def make_plan(subject: Subject, poses: FloatArray, mixed: int = MIXED) -> Plan:
+    """Lay out the states: sizes of rates and accelerations are those of the motions, so that parts weigh as there.
+
+    *mixed* is the number of states with everything at once; of a formula that fails at rest they tell the parts.
+    """
     s, na = poses.shape
     rates = _typical(subject.motion[1], 1.0)
     accelerations = _typical(subject.motion[2], 10.0)
@@ -115,7 +127,7 @@ def make_plan(subject: Subject, poses: FloatArray) -> Plan:
     for axis in range(3):
         add(("force", axis), zero, zero, push * np.eye(3)[axis])
     rng = np.random.default_rng(SEED + 1)
-    for number in range(MIXED):
+    for number in range(mixed):
         sign = rng.choice([-1.0, 1.0], na)
         sizes = rng.uniform(0.4, 1.0, (3, max(na, 3)))
         turn = rng.choice([-1.0, 1.0], 3)
@@ -144,7 +156,9 @@ Torques = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 
 
 def ask(plan: Plan, torques: Torques) -> tuple[FloatArray, dict[tuple[str | int, ...], str]]:
-    """Ask for the torques of all states; where some fail, state by state.
+    """Ask for the torques of all states; where some fail, pose by pose and probe by probe.
+
+    A pose at which the formula fails at rest and with everything moving is one at which it fails.
 
     Returns
     -------
@@ -159,19 +173,28 @@ def ask(plan: Plan, torques: Torques) -> tuple[FloatArray, dict[tuple[str | int,
         pass
     found = np.full(plan.q.shape, np.nan)
     failures: dict[tuple[str | int, ...], str] = {}
-    deadline = time.monotonic() + PATIENCE_S
-    for number, label in enumerate(plan.labels):
-        states = plan.q[number], plan.qd[number], plan.qdd[number], plan.force[number]
+    every = list(range(len(plan.labels)))
+
+    def answered(probes: list[int], poses: list[int]) -> bool:
+        states = (array[np.ix_(probes, poses)] for array in (plan.q, plan.qd, plan.qdd, plan.force))
         try:
-            found[number] = torques(*states)
-            continue
+            tau = torques(*(array.reshape(-1, array.shape[2]) for array in states))
         except WorkbenchError as error:
-            failures[label] = str(error)
-        for pose in range(plan.q.shape[1]):
-            if time.monotonic() > deadline:
-                break
-            try:
-                found[number, pose] = torques(*(array[pose : pose + 1] for array in states))[0]
-            except WorkbenchError:
-                continue
+            if len(probes) == 1:
+                failures.setdefault(plan.labels[probes[0]], str(error))
+            return False
+        found[np.ix_(probes, poses)] = tau.reshape(len(probes), len(poses), -1)
+        return True
+
+    poses = [pose for pose in range(plan.q.shape[1]) if not answered(every, [pose])]
+    if not poses:  # it fails only on all of them at once
+        return found, {plan.labels[0]: "it fails where all states are asked at once, and answers one pose at a time"}
+    hard = [probe for probe in every if not answered([probe], poses)]
+    ends = [probe for probe in hard if plan.labels[probe] in (("rest",), ("mixed", 0))]
+    for pose in poses:
+        fine = [answered([probe], [pose]) for probe in ends]
+        if len(ends) < 2 or any(fine):
+            for probe in hard:
+                if probe not in ends:
+                    answered([probe], [pose])
     return found, failures

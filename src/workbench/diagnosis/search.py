@@ -168,8 +168,10 @@ class _Search:
                     self._moves[made[text].place(node.text)] = score.moved
         ranked.sort(reverse=True)
         whole = [item[3] for item in ranked if item[0] == node.score.base.size]
-        kept = whole + [item[3] for item in ranked if item[0] != node.score.base.size][:FULL]
-        full = self._scores(kept, None)
+        kept, full = whole, self._scores(whole, None)
+        if not any(score is not None and score.complete for score in full):
+            others = [item[3] for item in ranked if item[0] != node.score.base.size][:FULL]
+            kept, full = whole + others, full + self._scores(others, None)
         return [
             Node(text, score, (*node.chain, (made[text], node.text)))
             for text, score in zip(kept, full, strict=True)

@@ -10,7 +10,7 @@ from workbench.diagnosis.items import Items, explain
 from workbench.diagnosis.parts import DRY, FORCE, INERTIA, ODD, REST, VELOCITY, VISCOUS, WEIGHT, Part, Parts
 from workbench.diagnosis.result import DYNAMICS, FRICTION, STRUCTURE, Finding, percent
 from workbench.diagnosis.result import FORCE as FORCE_KIND
-from workbench.diagnosis.shares import Share, missing_from
+from workbench.diagnosis.shares import Share, unread_ratio
 from workbench.diagnosis.subject import GRAVITY, MASS
 from workbench.diagnosis.subject import INERTIA as INERTIA_KIND
 from workbench.reference.terms import TURNING
@@ -37,10 +37,12 @@ def reasons(entry: Entry, shares: Sequence[Share], formula: Parts, reference: Pa
         if wrong and share.parameter.kind != GRAVITY:
             found.append((share.parameter.name, show_ratio(wrong[0].ratio)))
     if not found and entry.status == WRONG_MARK:
+        unread = [share for share in shares if not share.parameter.read]
+        ratios = [unread_ratio(share, formula, reference, entry.part, entry.joint) for share in unread]
         found = [
-            (share.parameter.name, "missing")
-            for share in shares
-            if not share.parameter.read and missing_from(share, formula, reference, entry.part, entry.joint)
+            (share.parameter.name, show_ratio(ratio))
+            for share, ratio in zip(unread, ratios, strict=True)
+            if ratio is not None
         ]
     if not found:
         for share in shares:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -54,11 +55,17 @@ def reference_torques(subject: Subject, plan: Plan, changes: Changes) -> FloatAr
 
 
 def share_of(
-    subject: Subject, plan: Plan, parameter: Parameter, formula: Parts, reference: Parts, floors: FloatArray
+    subject: Subject,
+    plan: Plan,
+    parameter: Parameter,
+    formula: Parts,
+    reference: Parts,
+    floors: FloatArray,
+    noise: FloatArray | None = None,
 ) -> Share | None:
     """Vary one parameter on both sides; None where either side refuses the other value.
 
-    *formula* and *reference* are the parts without the change, at the same plan.
+    *formula* and *reference* are the parts without the change, at the same plan; *noise* as in `compare_parts`.
     """
     try:
         moved_f, moved_r, _ = both_sides(subject, plan, {parameter.name: parameter.varied})
@@ -66,16 +73,20 @@ def share_of(
         return None
     found = {part: moved_f[part] - values for part, values in formula.items() if part in moved_f}
     wanted = {part: moved_r[part] - values for part, values in reference.items() if part in moved_r}
-    entries = compare_parts(found, wanted, floors, SHARE_RIGHT, SHARE_NOTHING)
+    entries = compare_parts(found, wanted, floors, SHARE_RIGHT, SHARE_NOTHING, noise)
     return Share(parameter, tuple(entries), found, wanted, plan.accelerations)
 
 
-def missing_from(share: Share, formula: Parts, reference: Parts, part: Part, joint: int) -> bool:
-    """Whether what an entry lacks is just what an affine parameter, which the formula never reads, is worth there."""
+def unread_ratio(share: Share, formula: Parts, reference: Parts, part: Part, joint: int) -> Fraction | float | None:
+    """Formula / reference of an affine parameter that the formula never reads, where it explains an entry's error.
+
+    0 where the entry lacks just what the parameter is worth there; another number where one stands in its place.
+    """
     parameter = share.parameter
     if parameter.kind not in AFFINE or part not in share.reference:
-        return False
+        return None
     step = parameter.varied - parameter.value
     worth = share.reference[part][:, joint] * (parameter.value / step)
     gap = (formula[part] - reference[part])[: len(worth), joint]
-    return bool(np.abs(worth).max() > 0.0 and ratio_of(gap, worth) == -1)
+    ratio = ratio_of(gap, worth) if np.abs(worth).max() > 0.0 else None
+    return None if ratio is None or ratio == 0 else 1 + ratio

@@ -6,9 +6,9 @@ import dataclasses
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -99,6 +99,36 @@ def siblings_of(path: str) -> Siblings:
     return Siblings(Path(path).parent)
 
 
+def code_of(text: str, path: str) -> list[CodeType]:
+    """Compile a source text statement by statement: of an edited text all but one have been compiled before.
+
+    Raises
+    ------
+    SyntaxError
+        The text is no Python.
+    """
+    if "__future__" in text:
+        return [compile(text, path, "exec")]
+    chunks: list[tuple[int, str]] = []
+    joined = False
+    for number, line in enumerate(text.splitlines(keepends=True)):
+        begins = line[0] not in " \t\n\r\f#)]}"
+        if chunks and (joined or not begins):
+            chunks[-1] = chunks[-1][0], chunks[-1][1] + line
+        else:
+            chunks.append((number, line))
+        joined = line.startswith("@") if begins else joined
+    try:
+        return [_compiled(number, chunk, path) for number, chunk in chunks]
+    except SyntaxError:  # a statement that goes on at the margin: an else, a text over several lines
+        return [compile(text, path, "exec")]
+
+
+@lru_cache(maxsize=256)
+def _compiled(number: int, chunk: str, path: str) -> CodeType:
+    return compile("\n" * number + chunk, path, "exec")
+
+
 def load_text(text: str, path: str, candidate: str) -> Callable[..., Any]:
     """Run a source text and return the function that it registers under a name.
 
@@ -111,7 +141,8 @@ def load_text(text: str, path: str, candidate: str) -> Callable[..., Any]:
     module.__file__ = path
     sys.modules[MODULE] = module
     with siblings_of(path).visible():
-        exec(compile(text, path, "exec"), module.__dict__)  # the user named this file on the command line
+        for code in code_of(text, path):
+            exec(code, module.__dict__)  # the user named this file on the command line
     for value in vars(module).values():
         if callable(value) and getattr(getattr(value, MARK, None), "name", None) == candidate:
             function: Callable[..., Any] = value

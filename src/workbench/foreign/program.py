@@ -20,7 +20,7 @@ from workbench.foreign.fault import ForeignError
 from workbench.foreign.served import MOST_ERROR, Scratch
 from workbench.processes import environment
 
-INTERPRETERS = {".jl": ("julia", "--startup-file=no"), ".R": ("Rscript", "--vanilla"), ".r": ("Rscript", "--vanilla")}
+INTERPRETERS = {".jl": "julia", ".R": "Rscript", ".r": "Rscript"}
 FORMAT = 1
 
 
@@ -37,11 +37,11 @@ class ProgramFormula:
         self._folder = Scratch()
         self._command = [str(self.path)]
         if path.suffix in INTERPRETERS:
-            name, *options = INTERPRETERS[path.suffix]
+            name = INTERPRETERS[path.suffix]
             found = shutil.which(name)
             if found is None:
                 raise SpecError(f"{path}: {name} is not installed", file=str(path))
-            self._command = [found, *options, str(self.path)]
+            self._command = [found, *_arguments(self.path)]
 
     def __call__(
         self, parameters: Mapping[str, float], arrays: tuple[FloatArray, ...], joints: tuple[str, ...], seconds: float
@@ -104,6 +104,18 @@ class ProgramFormula:
             text = complaints.decode("utf-8", errors="replace")[-MOST_ERROR:]
             lines = [line for line in text.splitlines() if line.strip()]
             place = re.findall(rf"{re.escape(self.path.name)}\D{{1,9}}(\d+)", text)
-            said = next((line for line in reversed(lines) if "rror" in line), lines[-1] if lines else "")
+            last = next((k for k in range(len(lines) - 1, -1, -1) if "rror" in lines[k]), len(lines) - 1)
+            said = lines[last] if lines else ""
+            if said.rstrip().endswith(":") and last + 1 < len(lines):  # R breaks a long line there
+                said = f"{said.rstrip()} {lines[last + 1].strip()}"
             what = f"ended with exit code {process.returncode}{': ' if said else ''}{said.strip()}"
             raise ForeignError(what, int(place[-1]) if place else None)
+
+
+def _arguments(path: Path) -> list[str]:
+    """What an interpreter is called with, so that it reads no settings and names the line of an error."""
+    if path.suffix == ".jl":
+        return ["--startup-file=no", str(path)]
+    # R names lines of what it sources alone
+    where = f"options(keep.source = TRUE, show.error.locations = TRUE); source({json.dumps(str(path))})"
+    return ["--vanilla", "-e", where]

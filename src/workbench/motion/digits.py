@@ -9,6 +9,9 @@ from workbench.arrays import FloatArray
 FULL = 13
 """Digits from which on a column counts as written with all of them."""
 
+UNIFORM = 3.0**-0.5
+"""Standard deviation of an error that is spread evenly over +-1, as rounding is over half of the last place."""
+
 _NEAR = 1e-14
 """Relative: a number this near to a shorter one was written as the shorter one."""
 

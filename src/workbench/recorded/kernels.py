@@ -15,8 +15,9 @@ from workbench.compiled import compiled
 
 
 @compiled
-def _triangular(a: FloatArray, rows: int, columns: int, width: int) -> None:
-    """Householder: the first *columns* columns of ``a[:rows, :width]`` become upper triangular, in place."""
+def _triangular(a: FloatArray, rows: int, columns: int, work: FloatArray) -> None:
+    """Householder: the first *columns* columns of ``a[:rows]`` become upper triangular, in place; *work* is a row."""
+    width = a.shape[1]
     for j in range(columns):
         norm = 0.0
         for i in range(j, rows):
@@ -32,16 +33,21 @@ def _triangular(a: FloatArray, rows: int, columns: int, width: int) -> None:
         if below == 0.0:
             continue
         for k in range(j + 1, width):
-            total = lead * a[j, k]
-            for i in range(j + 1, rows):
-                total += a[i, j] * a[i, k]
-            total *= 2.0 / below
-            a[j, k] -= total * lead
-            for i in range(j + 1, rows):
-                a[i, k] -= total * a[i, j]
-        a[j, j] = alpha
+            work[k] = lead * a[j, k]
         for i in range(j + 1, rows):
-            a[i, j] = 0.0
+            if a[i, j] != 0.0:
+                for k in range(j + 1, width):
+                    work[k] += a[i, j] * a[i, k]
+        scale = 2.0 / below
+        for k in range(j + 1, width):
+            work[k] *= scale
+            a[j, k] -= work[k] * lead
+        for i in range(j + 1, rows):
+            if a[i, j] != 0.0:
+                for k in range(j + 1, width):
+                    a[i, k] -= work[k] * a[i, j]
+                a[i, j] = 0.0
+        a[j, j] = alpha
 
 
 @compiled
@@ -66,25 +72,32 @@ def forward(
     dt: FloatArray,
     white: FloatArray,
     transition: FloatArray,
+    drive: FloatArray,
     rho: float,
     factors: FloatArray,
+    rhs: FloatArray,
     keep: bool,
 ) -> FloatArray:
     """Triangularise all rows; returns (residual sum of squares, log determinant) of the unit-variance problem.
 
-    *factors* ``(n, m, 2 m + 1)`` takes ``[R_kk, R_k,k+1 | z_k]`` of each sample where *keep* is true.
+    Each column of *y* ``(n, c)`` is a record of its own; the sum of squares is the first's. *drive* ``(n - 1, m)`` is
+    what each step adds to the state beside its noise. Where *keep* is true, *factors* ``(n, m, 2 m)`` takes
+    ``[R_kk, R_k,k+1]`` of each sample, and *rhs* ``(n, m, c)`` the right-hand sides.
     """
-    n, m = len(y), len(white)
-    a = np.zeros((2 * m + 1, 2 * m + 1))
-    info = np.zeros((m + 1, m + 1))
+    n, many = y.shape
+    m = len(white)
+    a = np.zeros((2 * m, 2 * m + many))
+    info = np.zeros((m + 1, m + many))
     w, wf = np.zeros((m, m)), np.zeros((m, m))
+    work = np.empty(2 * m + many)
     rss, logdet, last = 0.0, 0.0, -1.0
     for k in range(n):
-        for j in range(m + 1):
+        for j in range(m):
             info[m, j] = 0.0
         info[m, 0] = 1.0
-        info[m, m] = y[k]
-        _triangular(info, m + 1, m, m + 1)
+        for c in range(many):
+            info[m, m + c] = y[k, c]
+        _triangular(info, m + 1, m, work)
         rss += info[m, m] * info[m, m]
         if k == n - 1:
             break
@@ -92,45 +105,54 @@ def forward(
             last = dt[k]
             _step_rows(white, transition, last, rho, w, wf)
         for i in range(m):
+            driven = 0.0
             for j in range(m):
-                a[i, j] = info[i, j]
-                a[i, m + j] = 0.0
-                a[m + i, j] = -wf[i, j]
-                a[m + i, m + j] = w[i, j]
-            a[i, 2 * m] = info[i, m]
-            a[m + i, 2 * m] = 0.0
+                a[i, j] = -wf[i, j]
+                a[i, m + j] = w[i, j]
+                a[m + i, j] = info[i, j]
+                a[m + i, m + j] = 0.0
+                driven += w[i, j] * drive[k, j]
+            for c in range(many):
+                a[i, 2 * m + c] = driven
+                a[m + i, 2 * m + c] = info[i, m + c]
             logdet -= np.log(abs(w[i, i]))
-        _triangular(a, 2 * m, 2 * m, 2 * m + 1)
+        _triangular(a, 2 * m, 2 * m, work)
         for i in range(m):
             logdet += np.log(abs(a[i, i]))
             for j in range(m):
                 info[i, j] = a[m + i, m + j]
-            info[i, m] = a[m + i, 2 * m]
+            for c in range(many):
+                info[i, m + c] = a[m + i, 2 * m + c]
             if keep:
-                for j in range(2 * m + 1):
+                for j in range(2 * m):
                     factors[k, i, j] = a[i, j]
+                for c in range(many):
+                    rhs[k, i, c] = a[i, 2 * m + c]
     for i in range(m):
         logdet += np.log(abs(info[i, i]))
         if keep:
             for j in range(m):
                 factors[n - 1, i, j] = info[i, j]
-            factors[n - 1, i, 2 * m] = info[i, m]
+            for c in range(many):
+                rhs[n - 1, i, c] = info[i, m + c]
     return np.array([rss, logdet])
 
 
 @compiled
-def backward(factors: FloatArray, noise: FloatArray, states: FloatArray) -> None:
-    """Solve for the states ``(n, m)``; *noise* ``(n, m)``, of unit variance, makes them a draw from the posterior."""
-    n, m = states.shape
+def backward(factors: FloatArray, rhs: FloatArray) -> None:
+    """Solve for the states, in place of *rhs* ``(n, m, c)``. Right-hand sides of unit variance give the posterior's."""
+    n, m, many = rhs.shape
     for k in range(n - 1, -1, -1):
         for i in range(m - 1, -1, -1):
-            total = factors[k, i, 2 * m] + noise[k, i]
             if k < n - 1:
                 for j in range(m):
-                    total -= factors[k, i, m + j] * states[k + 1, j]
+                    for c in range(many):
+                        rhs[k, i, c] -= factors[k, i, m + j] * rhs[k + 1, j, c]
             for j in range(i + 1, m):
-                total -= factors[k, i, j] * states[k, j]
-            states[k, i] = total / factors[k, i, i]
+                for c in range(many):
+                    rhs[k, i, c] -= factors[k, i, j] * rhs[k, j, c]
+            for c in range(many):
+                rhs[k, i, c] /= factors[k, i, i]
 
 
 @compiled

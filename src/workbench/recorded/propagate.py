@@ -85,7 +85,8 @@ def uncertainty(
             by = np.stack([slope[:, :, j] for slope in slopes], axis=2)  # (n, na, 3)
             variance += np.einsum("nak,nkl,nal->na", by, one.covariance, by)
             draws += np.einsum("nak,dnk->dna", by, one.draws(count, SEED + 1 + j))
-    sigma = np.sqrt(variance)
+    # the covariance takes rounding for independent; the draws do not, and are few
+    sigma = np.sqrt(np.maximum(variance, np.mean(draws**2, axis=0)))
     over = np.abs(np.divide(draws, sigma, out=np.zeros_like(draws), where=sigma > 0.0))
     return Uncertainty(
         sigma,

@@ -15,11 +15,9 @@ from workbench.delimited import Column, Table, factor_of, find_columns, parse_ta
 from workbench.delimited.read import shown
 from workbench.delimited.units import spellings_of
 from workbench.errors import MotionError, did_you_mean
-from workbench.motion.digits import FULL, rounding_of
+from workbench.motion.digits import FULL, UNIFORM, rounding_of
 
 MAX_SAMPLES = 100_000
-UNIFORM = 3.0**-0.5
-"""Standard deviation of an error that is spread evenly over +-1."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +34,13 @@ class Written:
 
     digits: int
     """`FULL` and more: with all of them"""
-    sigma: float
-    """standard deviation of its rounding, SI; 0 where it has all digits"""
+    half: float
+    """half of its last place, SI; 0 where it has all digits"""
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of its rounding, SI."""
+        return self.half * UNIFORM
 
 
 @dataclass(frozen=True)
@@ -271,7 +274,7 @@ def _block(
     for column in found:
         assert column is not None
         half, digits = rounding_of(table.values[:, column.index])
-        written.append(Written(digits, half * column.factor * UNIFORM))
+        written.append(Written(digits, half * column.factor))
     return np.column_stack([column.si(table) for column in found if column]), tuple(written)
 
 

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.errors import MotionError, WorkbenchError
+from workbench.errors import ModelError, MotionError, WorkbenchError
 from workbench.mjcf.compile import custom_text, engine_warnings
 from workbench.reference.closure import LoopCloser, constraint_jacobian
 from workbench.reference.engine import Engine
@@ -156,6 +156,29 @@ def _counted(closed_form: Any) -> dict[str, int]:
     """Freedoms by the formula of the robot's source, where it gives one."""
     count = getattr(closed_form, "mobility_count", None)
     return count() if count else {}
+
+
+def refuse_elsewhere(loaded: LoadedModel) -> None:
+    """Refuse a robot whose loops close only in another assembly than its closed form's, or where that has none.
+
+    Raises
+    ------
+    ModelError
+        The platform at home is not where the closed form puts it.
+    """
+    if loaded.closed_form is None:
+        return
+    reached = _Closed(loaded)
+    agreement = _agreement(reached, loaded.closed_form, ())[1]
+    if not agreement.ok:
+        moved = float(
+            np.max(np.abs(reached.closer.home - reached.structure.home_qpos)[reached.structure.actuated_qpos])
+        )
+        raise ModelError(
+            f"{agreement.message}; with these lengths the robot cannot be assembled at home: the active joints had to"
+            f" move by up to {moved:.3g} (m or rad) for the loops to close; nothing was written",
+            file=loaded.file,
+        )
 
 
 def names_itself(path: str | Path) -> bool:

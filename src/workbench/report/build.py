@@ -21,12 +21,12 @@ from workbench.report.latex import latex_table
 from workbench.report.load import Run, load_run, read_manifest
 from workbench.report.section import Section
 from workbench.report.sections import build_sections
-from workbench.report.style import STYLES, figure_style
+from workbench.report.style import PAPERS, STYLES, figure_style
 from workbench.report.svg import StyleSheet, inline, standalone
 from workbench.report.sweep.load import SweepRun, load_sweep
 from workbench.report.sweep.sections import sweep_sections
 from workbench.report.text import fenced, finalize_markdown
-from workbench.report.verdict_section import circumstances
+from workbench.report.verdict_section import changes, circumstances
 
 FIGURES = "figures"
 TABLES = "tables"
@@ -43,7 +43,11 @@ Show = Callable[[int, int], None]
 
 
 def build_report(
-    run_dir: str | Path, formats: Sequence[str] = ("html", "md"), style: str = "page", show: Show | None = None
+    run_dir: str | Path,
+    formats: Sequence[str] = ("html", "md"),
+    style: str = "page",
+    show: Show | None = None,
+    paper: str = "a4",
 ) -> list[Path]:
     """Write the report of a finished run beside its results.
 
@@ -59,6 +63,8 @@ def build_report(
         ``page``, or ``paper``: figures for the column of a paper.
     show
         See `Show`.
+    paper
+        ``a4`` or ``letter``: the pages of report.pdf.
 
     Returns
     -------
@@ -69,10 +75,11 @@ def build_report(
     ------
     OutputError
         Results are missing, torn or of another format version, or the report cannot be written. No file is left
-        half-written. Also an unknown format or style.
+        half-written. Also an unknown format, style or paper.
     """
     _check_choice("format", formats, FORMATS)
     _check_choice("style", [style], STYLES)
+    _check_choice("paper", [paper], PAPERS)
     run_dir = Path(run_dir)
     manifest = read_manifest(run_dir)
     run: Run | SweepRun
@@ -83,7 +90,7 @@ def build_report(
         run = load_sweep(run_dir, manifest)
         sections = sweep_sections(run)
     with figure_style(style), _few_collections():
-        files = _rendered(run, sections, formats, show)
+        files = _rendered(run, sections, formats, style, paper, show)
     wanted = tuple(name for name in formats if name in DATA_FORMATS)
     if wanted and manifest.sweep is not None:
         raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; a sweep's data are Parquet")
@@ -110,11 +117,11 @@ def _check_choice(what: str, given: Sequence[str], allowed: Iterable[str]) -> No
 
 
 def _rendered(
-    run: Run | SweepRun, sections: list[Section], formats: Sequence[str], show: Show | None
+    run: Run | SweepRun, sections: list[Section], formats: Sequence[str], style: str, paper: str, show: Show | None
 ) -> dict[Path, bytes]:
     files: dict[Path, bytes] = {}
     if "pdf" in formats:
-        from workbench.report.pdf import all_tables, figure_pdf, report_pdf  # half a second of imports
+        from workbench.report.pdf import all_tables, figure_pdf, report_pdf  # Typst is loaded where it is needed
     figures = run.directory / FIGURES
     plots = [plot for section in sections for plot in section.plots]
     for number, plot in enumerate(plots):
@@ -125,7 +132,7 @@ def _rendered(
         if "md" in formats:
             files[figures / f"{plot.key}.svg"] = standalone(plot.svg, plot.alt).encode()
         if "pdf" in formats:
-            files[figures / f"{plot.key}.pdf"] = figure_pdf(plot)
+            files[figures / f"{plot.key}.pdf"] = figure_pdf(plot, style)
         if "html" in formats:
             _ = plot.svg  # drawn here, where garbage is taken care of
     if "md" in formats:
@@ -133,7 +140,7 @@ def _rendered(
     if "html" in formats:
         files[run.directory / "report.html"] = render_html(run, sections).encode()
     if "pdf" in formats:
-        files[run.directory / "report.pdf"] = report_pdf(run, sections)
+        files[run.directory / "report.pdf"] = report_pdf(run, sections, style, paper)
         costs = cost_table(run.manifest)
         for table in (*all_tables(sections), *([costs] if costs else [])):
             files[run.directory / TABLES / f"{table.key}.tex"] = latex_table(table).encode()
@@ -156,6 +163,7 @@ def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
     text = page.render(
         manifest=run.manifest,
         circumstances=circumstances(run.manifest),
+        changes=changes(run.manifest),
         costs=cost_table(run.manifest),
         sections=bodies,
         style=Markup(style + sheet.rules),
@@ -190,6 +198,7 @@ def render_markdown(run: Run | SweepRun, sections: list[Section]) -> str:
     ]
     text = environment.get_template("report.md.j2").render(
         manifest=run.manifest,
+        changes=changes(run.manifest),
         circumstances=circumstances(run.manifest),
         costs=cost_table(run.manifest),
         sections=bodies,

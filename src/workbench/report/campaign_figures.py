@@ -25,7 +25,7 @@ from workbench.report.load import Run, Series
 from workbench.report.manifest import FigureRecord
 from workbench.report.plot import Plot
 from workbench.report.style import PALETTE
-from workbench.report.text import exact, pretty_unit
+from workbench.report.text import exact, pretty_unit, torque_label
 
 LINEAR_FROM = 1e-4
 """Errors over cases that are all at least this large are drawn in percent from zero; smaller ones on a log axis."""
@@ -169,7 +169,7 @@ def _campaign_torque(run: Run, record: FigureRecord, key: str, series: Series, a
     def draw(figure: FigureBase) -> None:
         above, below = stack(figure, [2.6, 1.0], header=legend_rows(len(curves), columns=4))
         torque_lines(above, run, series, joint, curves)
-        above.set_ylabel(f"{joint} [{unit}]")
+        above.set_ylabel(torque_label(joint, run.manifest.unit_of(joint)))
         figure_legend(figure, above, columns=4)
         error_panel(below, errors, [])
 

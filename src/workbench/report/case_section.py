@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from workbench.campaign.conclusion import case_status
 from workbench.metrics import POINTWISE_FLOOR
 from workbench.report.budget import budget_tables
 from workbench.report.evidence import (
@@ -25,7 +26,7 @@ from workbench.report.plot import Plot
 from workbench.report.recorded import recorded_tables
 from workbench.report.spent import spent_plot, spent_table
 from workbench.report.tables import CASE_STATUS, KINDS, Cell, Status, Table, columns, verdict_status
-from workbench.report.text import error_fraction, exact, percent, pretty_unit, scientific, with_unit
+from workbench.report.text import error_fraction, exact, percent, scientific, torque_label, with_unit
 
 ERRORS_DEFINED = (
     "Peak error is max|Δτ| / max|τ_ref|, rms error is rms(Δτ) / rms(τ_ref), both per joint over the whole case, so "
@@ -89,7 +90,7 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None, film: Fil
         name=case,
         anchor=anchor,
         record=record,
-        status=CASE_STATUS[record.status],
+        status=CASE_STATUS[case_status(record.status, [*(r.verdict for r in rows), *_kinematics(record)])],
         facts=tuple(_facts(record)),
         motion=tuple(motion_plots(run, case, anchor, series)) if series is not None else (),
         torques=tuple(torque_plots(run, case, anchor, series)) if series is not None else (),
@@ -100,6 +101,10 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None, film: Fil
         film=film if film is not None and film.case == case else None,
         times=_times(rows, series) if series is not None else "",
     )
+
+
+def _kinematics(record: CaseRecord) -> list[str]:
+    return [check.verdict for check in record.kinematics_checks]
 
 
 def _times(rows: list[ErrorRow], series: Series) -> str:
@@ -143,6 +148,8 @@ SHOWS = {
     "expected-failure": "Declared failures: formulas that are kept wrong on purpose, against the reference.",
     "modelling": "Modelling error: formulas against a reference that assumes something else, its masses for "
     "instance, so that a real difference is expected.",
+    "unbounded": "Measured, nothing judged: formulas without a bound, against the reference that makes the same "
+    "assumption about the masses.",
     "recorded": "Measured or simulated elsewhere: recorded torques against the reference on the recorded motion.",
     "contrast": "For contrast: MuJoCo's own mj_inverse, which does not project the loops' constraint forces out.",
 }
@@ -151,6 +158,8 @@ READING = {
     "expected-failure": f"A declared failure has to exceed its bound, every other row has to keep it. {ERRORS_DEFINED}",
     "modelling": "A measured result without a bound, in percent of the reference's own peak, or rms, on that joint; "
     f"the pointwise error leaves out samples below {100 * POINTWISE_FLOOR:g} % of that peak; “left out” counts them.",
+    "unbounded": "Nobody says how good these formulas have to be; a right one differs by round-off. In percent of the "
+    "reference's own peak, or rms, on that joint.",
     "recorded": "In percent of the reference's own peak, or rms, on that joint. “Uncertainty” is what the digits and "
     "the noise of motion and recorder leave open: in 95 % of cases the largest difference that they make is smaller.",
     "contrast": "Nothing judges these rows: they show why the reference projects. In percent of the reference's own "
@@ -202,5 +211,5 @@ def _error_table(run: Run, case: str, kind: str, rows: list[ErrorRow], anchor: s
 
 
 def joint_heading(run: Run, joint: str) -> str:
-    """Return ``q1 [N]``: the joint with the unit of its force or torque."""
-    return f"{joint} [{pretty_unit(run.manifest.unit_of(joint))}]"
+    """Return ``τ1 [N]``: the generalized force of a joint with its unit."""
+    return torque_label(joint, run.manifest.unit_of(joint))

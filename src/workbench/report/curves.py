@@ -126,7 +126,8 @@ def error_of_row(row: ErrorRow, series: Series, color: str) -> ErrorCurve | None
         return None
     error = np.abs(candidate - reference) / row.normaliser
     label = f"{row.candidate} − {row.reference}"
-    return ErrorCurve(series["t"], error, color, row.kind == "modelling", label, (row.worst_time_s, row.peak_error))
+    measured = row.kind in ("modelling", "unbounded")
+    return ErrorCurve(series["t"], error, color, measured, label, (row.worst_time_s, row.peak_error))
 
 
 def error_panel(axes: Axes, curves: Sequence[ErrorCurve], bounds: Iterable[float]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from workbench.report.case_section import joint_heading
 from workbench.report.load import ErrorRow, Run
 from workbench.report.section import Section
-from workbench.report.tables import CLAIM_STATUS, FAILURES, Cell, Table, columns, verdict_status
+from workbench.report.tables import CLAIM_STATUS, FAILURES, NOT_ABOUT, Cell, Table, columns, verdict_status
 from workbench.report.text import error_fraction, exact, percent, quantity
 
 WORST_ROWS = 12
@@ -31,8 +31,8 @@ def claims_section(run: Run) -> Section | None:
                 Cell(claim.source),
                 Cell(claimed, claim.claimed),
                 Cell(quantity(claim.measured, claim.unit), claim.measured),
-                Cell(status=CLAIM_STATUS[claim.holds]),
-                Cell(claim.note),
+                Cell(status=NOT_ABOUT if claim.not_about else CLAIM_STATUS[claim.holds]),
+                Cell(claim.not_about or claim.note),
             )
         )
     table = Table(
@@ -44,7 +44,8 @@ def claims_section(run: Run) -> Section | None:
         "means that "
         "this run holds no measurement that could confirm or refute it. ± is how far a number may lie from the "
         "printed one "
-        "and still agree with it.",
+        "and still agree with it. “Not about this robot” is not judged: the note says what was changed, and the number "
+        "measured is that of the changed robot.",
     )
     return Section("claims", "The papers' claims", "tables", {"tables": [table]})
 
@@ -69,6 +70,14 @@ def worst_section(run: Run, anchors: Mapping[str, str]) -> Section:
             anchors,
             "modelling",
             "Modelling error: how far formulas are from a reference that assumes something else, mostly about masses.",
+            "The row's largest in bold, and rows in order of it",
+            percent,
+        ),
+        _by_joint(
+            run,
+            anchors,
+            "unbounded",
+            "Measured, nothing judged: formulas without a bound against the reference of the same mass model.",
             "The row's largest in bold, and rows in order of it",
             percent,
         ),
@@ -133,7 +142,7 @@ def _by_joint(
             if found is None:
                 cells.append(Cell("–"))
                 continue
-            strong = found is largest if kind == "modelling" else found.verdict == "expected-fail"
+            strong = found is largest if kind in ("modelling", "unbounded") else found.verdict == "expected-fail"
             cells.append(Cell(number(found.peak_error), found.peak_error, emphasis=strong))
         loudest = next((row for row in by_joint.values() if row.verdict in FAILURES), largest)
         status = Cell(status=verdict_status(loudest.verdict))

@@ -21,7 +21,7 @@ from workbench.report.layout import SMALL, TALL, WIDE, figure_legend, legend, le
 from workbench.report.load import ErrorRow, Run, Series
 from workbench.report.plot import Plot
 from workbench.report.style import PALETTE
-from workbench.report.text import exact, pretty_unit, scientific
+from workbench.report.text import exact, pretty_unit, scientific, torque_label
 
 REACTIONS_DRAWN = 6
 """Reactions in one figure, the largest; the table holds them all."""
@@ -40,13 +40,13 @@ def motion_plots(run: Run, case: str, key: str, series: Series) -> list[Plot]:
                 if manifest.coordinate_units[index] == unit:
                     style = DASHES[index % 4]
                     axes.plot(time, series[f"q{index + 1}"], color=PALETTE[index % 6], linestyle=style, label=joint)
-            axes.set_ylabel(f"[{pretty_unit(unit)}]")
+            axes.set_ylabel(f"q [{pretty_unit(unit)}]")
             legend(axes)
 
     def platform(figure: FigureBase) -> None:
         (axes,) = stack(figure, [1.0])
         platform_lines(axes, run, series, "x")
-        axes.set_ylabel("[m]")
+        axes.set_ylabel("position [m]")
         legend(axes)
 
     def speed(figure: FigureBase) -> None:
@@ -113,7 +113,7 @@ def _torque_plot(run: Run, case: str, key: str, series: Series, index: int, rows
     def draw(figure: FigureBase) -> None:
         above, below = stack(figure, [1.5, 1.0], header=legend_rows(len(curves)))
         torque_lines(above, run, series, joint, curves)
-        above.set_ylabel(f"{joint} [{unit}]")
+        above.set_ylabel(torque_label(joint, run.manifest.force_units[index]))
         figure_legend(figure, above)
         error_panel(below, [e for e in errors if e is not None], [row.bound for row in rows if row.bound])
 

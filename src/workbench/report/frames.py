@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from workbench.campaign.conclusion import Conclusion
 from workbench.errors import OutputError, did_you_mean
 from workbench.report import load
+from workbench.report.concluded import conclusion_of
 from workbench.report.manifest import Manifest
 
 if TYPE_CHECKING:
@@ -41,7 +43,12 @@ class RunFrames:
         """What was run, and how it came out."""
         verdicts = self.summary["verdict"].value_counts().to_dict() if len(self.summary) else {}
         counts = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items()) or "nothing compared"
-        return f"<Run {self.manifest.campaign} in {self.directory}: {self.manifest.status}; {counts}>"
+        return f"<Run {self.manifest.campaign} in {self.directory}: {self.conclusion.text} ({counts})>"
+
+    @property
+    def conclusion(self) -> Conclusion:
+        """The verdict on the run: ``status``, ``sentence``, ``passed``."""
+        return conclusion_of(self._run)
 
     @property
     def cases(self) -> list[str]:

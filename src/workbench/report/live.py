@@ -21,6 +21,8 @@ def run(
     only: Sequence[str] = (),
     settings: Mapping[str, float] | None = None,
     quick: bool = False,
+    keep_going: bool = False,
+    replace: bool = False,
 ) -> RunFrames:
     """Run a campaign of cases, write its run directory with the report, and return its results.
 
@@ -35,6 +37,9 @@ def run(
         As `workbench run`: run directory (``reports/NAME``), another model, cases, parameters over all others.
     quick
         Errors only: no power balance, no forward replay.
+    keep_going, replace
+        As `workbench run`: go on past cases that cannot be driven; replace an earlier run that holds more or another
+        robot.
 
     Raises
     ------
@@ -44,5 +49,6 @@ def run(
     outcome = run_campaign(
         campaign, out, model=model, only=only, settings=settings, candidates=candidates,
         effort=Effort(budget=False) if quick else FULL, report=build_report,
+        keep_going=keep_going, replace=replace,
     )  # fmt: skip
     return load_run(outcome.directory)

@@ -68,6 +68,8 @@ class ClaimRecord(Record):
     """``%`` says that the numbers are fractions and read best as percentages"""
     measured: float | None = None
     holds: bool | None = None
+    not_about: str = ""
+    """why the claim is not about the robot of this run; then it is not judged"""
     note: str = ""
 
 
@@ -89,6 +91,8 @@ class FigureRecord(Record):
     """for ``error_over``: what the numbers of *abscissa* are, with their unit"""
     reference: str | None = None
     """for ``error_over``: the reference mass model that the errors are held against"""
+    not_about: str = ""
+    """why the figure's source does not show the robot that is drawn"""
 
 
 class SingularityRecord(Record):
@@ -255,10 +259,19 @@ class KinematicsRecord(Record):
 class CaseRecord(Record):
     """One case: its status and the scalar evidence about mechanism and reference. Missing evidence is None."""
 
-    status: Literal["passed", "failed", "error", "undecided", "invalid", "timeout", "killed", "filtered"]
+    status: Literal[
+        "passed", "failed", "error", "undecided", "nothing-judged", "not-driven", "invalid", "timeout", "killed",
+        "filtered",
+    ]  # fmt: skip
     title: str = ""
     description: str = ""
     message: str | None = None
+    time_s: float | None = None
+    """of a case that cannot be driven: when"""
+    nearest: tuple[float | None, ...] | None = None
+    """of such a case: the last pose of the platform that can be reached on the straight way from home"""
+    nearest_q: tuple[float | None, ...] | None = None
+    """likewise, actuated coordinates"""
     samples: int | None = None
     duration_s: float | None = None
     parameters: dict[str, float | None] = Field(default_factory=dict)
@@ -287,6 +300,24 @@ class CaseRecord(Record):
     spent: SpentRecord = SpentRecord()
     kinematics_checks: tuple[KinematicsRecord, ...] = ()
     warnings: tuple[str, ...] = ()
+
+
+class ChangeRecord(Record):
+    """One parameter that is not what the robot's source says, SI."""
+
+    name: str
+    unit: str = ""
+    before: float | None = None
+    after: float | None = None
+    by: str = ""
+    cases: tuple[str, ...] = ()
+
+
+class ChangesRecord(Record):
+    """In what the robots of a run are others than the one that claims, sources and published figures are about."""
+
+    model: str = ""
+    parameters: tuple[ChangeRecord, ...] = ()
 
 
 class DiagnosisRecord(Record):
@@ -321,6 +352,7 @@ class Manifest(Record):
     platform_axes: tuple[str, ...] = ("x1", "x2", "x3")
     mobility_count: dict[str, int] = Field(default_factory=dict)
     parameters: tuple[ParameterRecord, ...] = ()
+    changes: ChangesRecord = ChangesRecord()
     versions: dict[str, str] = Field(default_factory=dict)
     machine: dict[str, Any] = Field(default_factory=dict)
     git_commit: str | None = None
@@ -328,10 +360,14 @@ class Manifest(Record):
     budget: bool | None = None
     """whether the evidence about the reference was gathered; None where the run does not say"""
     command: str = ""
+    request: dict[str, Any] | None = None
+    """model, set, only, candidates as they were asked for; None in runs of earlier versions"""
     started: str = ""
     finished: str = ""
     seconds: float | None = None
-    status: Literal["passed", "failed", "error"]
+    status: Literal["passed", "failed", "error", "undecided", "incomplete", "nothing-judged"]
+    verdict: str = ""
+    """the sentence beside the status; it can always be made again from rows and cases"""
     candidates: dict[str, CandidateRecord]
     claims: tuple[ClaimRecord, ...] = ()
     figures: tuple[FigureRecord, ...] = ()

@@ -1,16 +1,21 @@
-"""The report as one PDF, set by matplotlib: text and tables, then each case's figures as vector graphics."""
+"""The report as one PDF, and each figure as one: set by Typst from the same sections, tables and drawings as the page.
+
+The text travels as JSON and the drawings as SVG files beside it, so nothing that a campaign names is read as markup.
+"""
 
 from __future__ import annotations
 
+import base64
 import io
-import textwrap
-import warnings
-from collections.abc import Sequence
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
 
-import numpy as np
-from matplotlib.backends.backend_pdf import PdfPages
-from matplotlib.figure import Figure, FigureBase
-from matplotlib.lines import Line2D
+import matplotlib as mpl
+import typst
 from PIL import Image
 
 from workbench.report.case_section import CaseView
@@ -18,193 +23,56 @@ from workbench.report.cost import cost_table
 from workbench.report.load import Run
 from workbench.report.plot import Plot
 from workbench.report.section import Section
-from workbench.report.style import GRID, INK
-from workbench.report.svg import new_figure
+from workbench.report.style import PAPERS
+from workbench.report.svg import standalone
 from workbench.report.sweep.load import SweepRun
-from workbench.report.tables import Cell, Table
-from workbench.report.verdict_section import circumstances
+from workbench.report.tables import Cell, Status, Table
+from workbench.report.verdict_section import changes, circumstances
 
-A4 = (8.27, 11.69)
-MARGIN = 0.55
-POINTS_PER_INCH = 72.0
-LINE = 1.3
-"""Distance of lines, in letter heights."""
-LETTER = 0.56
-"""Mean width of a letter, in letter heights."""
-BODY, SMALL_PRINT, TABLE_PRINT = 9.0, 7.5, 6.4
-NARROWEST = 6
-"""Letters that a column keeps when a table is too wide for the page."""
 FULL_WIDTH_FROM = 7.0
 """inches: figures designed wider than this take the whole width of the page"""
+LONG = 36
+"""Letters from which on a column of a table breaks its lines."""
+FONTS = {"page": "DejaVu Sans", "paper": "DejaVu Serif"}
+"""Letters of drawings, by style: those that matplotlib brings and has measured them with."""
+CHANGED = (
+    "Another robot than the one that the campaign is about. Claims about that one are not judged where this concerns"
+    " them."
+)
+FIGURE = """#set document(date: none)
+#set page(width: auto, height: auto, margin: 0pt)
+#image("figure.svg")
+"""
+
+Block = dict[str, Any]
 
 
-class Pages:
-    """A4 pages that fill from the top."""
-
-    def __init__(self, sink: PdfPages) -> None:
-        self._sink = sink
-        self._page: Figure | None = None
-        self._y = 0.0
-
-    @property
-    def width(self) -> float:
-        """Inches between the margins."""
-        return A4[0] - 2 * MARGIN
-
-    def finish(self) -> None:
-        """Write the page that is being filled."""
-        if self._page is not None:
-            self._sink.savefig(self._page)  # type: ignore[no-untyped-call]
-            self._page = None
-
-    def room(self, height: float) -> Figure:
-        """Return a page with *height* inches left."""
-        if self._page is None or self._y + height > A4[1] - MARGIN:
-            self.finish()
-            self._page, self._y = new_figure(*A4), MARGIN
-        return self._page
-
-    def lines(self, text: str, size: float, indent: float = 0.0, bold: bool = False, after: float = 0.08) -> None:
-        """Set a paragraph."""
-        letters = int((self.width - indent) * POINTS_PER_INCH / (LETTER * size))
-        for line in textwrap.wrap(text, letters) or [""]:
-            step = size * LINE / POINTS_PER_INCH
-            self._put(self.room(step), MARGIN + indent, line, size, bold)
-            self._y += step
-        self._y += after
-
-    def table(self, table: Table) -> None:
-        """Set a table between its two sentences; its head stands on every page that it reaches."""
-        self.room(1.2)
-        self.lines(table.shows, BODY, bold=True)
-        widths = _column_widths(table, int(self.width * POINTS_PER_INCH / (LETTER * TABLE_PRINT)))
-        head = [column.title for column in table.columns]
-        self._row(head, widths, table, bold=True)
-        for row in table.rows:
-            texts = [_shown(cell) for cell in row]
-            before = self._page
-            self.room(self._height(texts, widths))
-            if self._page is not before:
-                self._row(head, widths, table, bold=True)
-            self._row(texts, widths, table)
-        self._y += 0.05
-        self.lines(f"How to read it: {table.reading}", SMALL_PRINT, after=0.2)
-
-    def plots(self, plots: Sequence[Plot]) -> None:
-        """Set figures, two in a row, wide ones alone, each above its caption."""
-        rows: list[list[Plot]] = []
-        for plot in plots:
-            alone = plot.size[0] > FULL_WIDTH_FROM
-            if alone or not rows or len(rows[-1]) == 2 or rows[-1][0].size[0] > FULL_WIDTH_FROM:
-                rows.append([plot])
-            else:
-                rows[-1].append(plot)
-        for row in rows:
-            self._plot_row(row)
-
-    def picture(self, content: bytes, caption: str) -> None:
-        """Set a picture of pixels, half as wide as the page."""
-        with Image.open(io.BytesIO(content)) as image:
-            pixels = np.asarray(image.convert("RGB"))
-        width = self.width / 2
-        height = width * pixels.shape[0] / pixels.shape[1]
-        page = self.room(height + 0.3)
-        axes = page.add_axes((MARGIN / A4[0], 1 - (self._y + height) / A4[1], width / A4[0], height / A4[1]))
-        axes.imshow(pixels, aspect="auto")
-        axes.set_axis_off()
-        self._put(page, MARGIN, caption, SMALL_PRINT, below=height + 0.05)
-        self._y += height + 0.35
-
-    def _plot_row(self, row: list[Plot]) -> None:
-        alone = row[0].size[0] > FULL_WIDTH_FROM
-        width = self.width if alone else self.width / 2
-        height = max(width * plot.size[1] / plot.size[0] for plot in row)
-        letters = int((width - 0.15) * POINTS_PER_INCH / (LETTER * SMALL_PRINT))
-        captions = [textwrap.wrap(plot.caption, letters) for plot in row]
-        step = SMALL_PRINT * LINE / POINTS_PER_INCH
-        page = self.room(height + max(map(len, captions)) * step + 0.15)
-        for number, (plot, caption) in enumerate(zip(row, captions, strict=True)):
-            left = MARGIN + number * width
-            plot.draw(_part(page, left, self._y, width - (0.0 if alone else 0.1), height))
-            for line, text in enumerate(caption):
-                self._put(page, left, text, SMALL_PRINT, below=height + line * step)
-        self._y += height + max(map(len, captions)) * step + 0.15
-
-    def _row(self, texts: Sequence[str], widths: Sequence[int], table: Table, bold: bool = False) -> None:
-        height = self._height(texts, widths)
-        page = self.room(height)
-        left = MARGIN
-        letter = LETTER * TABLE_PRINT / POINTS_PER_INCH
-        for text, letters, column in zip(texts, widths, table.columns, strict=True):
-            for number, line in enumerate(_wrapped(text, letters)):
-                at = left + (letters - 2) * letter if column.numeric else left
-                below = 0.045 + number * TABLE_PRINT * LINE / POINTS_PER_INCH
-                self._put(page, at, line, TABLE_PRINT, bold, below, right=column.numeric)
-            left += letters * letter
-        self._y += height
-        self._rule(page, INK if bold else GRID)
-
-    def _rule(self, page: Figure, color: str) -> None:
-        y = 1 - self._y / A4[1]
-        right = (A4[0] - MARGIN) / A4[0]
-        page.add_artist(Line2D([MARGIN / A4[0], right], [y, y], color=color, linewidth=0.4))
-
-    def _height(self, texts: Sequence[str], widths: Sequence[int]) -> float:
-        lines = max(len(_wrapped(text, letters)) for text, letters in zip(texts, widths, strict=True))
-        return lines * TABLE_PRINT * LINE / POINTS_PER_INCH + 0.07
-
-    def _put(
-        self,
-        page: Figure,
-        x: float,
-        text: str,
-        size: float,
-        bold: bool = False,
-        below: float = 0.0,
-        right: bool = False,
-    ) -> None:
-        page.text(
-            x / A4[0],
-            1 - (self._y + below) / A4[1],
-            text,
-            fontsize=size,
-            fontweight="bold" if bold else "normal",
-            ha="right" if right else "left",
-            va="top",
-        )
-
-
-def report_pdf(run: Run | SweepRun, sections: Sequence[Section]) -> bytes:
-    """Return the whole report as PDF; the same results give the same bytes."""
+def report_pdf(run: Run | SweepRun, sections: Sequence[Section], style: str = "page", paper: str = "a4") -> bytes:
+    """Return the whole report as PDF, on *paper* (a key of `PAPERS`); the same results give the same bytes."""
     manifest = run.manifest
-    title = manifest.title or manifest.campaign
-    buffer = io.BytesIO()
-    told = {"Title": f"{title}: error report", "Creator": "workbench", "Producer": None, "CreationDate": None}
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph")  # a name in another script: this font has it not
-        with PdfPages(buffer, metadata=told) as sink:
-            pages = Pages(sink)
-            pages.lines(f"Error report of the campaign {manifest.campaign}", SMALL_PRINT, after=0.02)
-            pages.lines(title, 15.0, bold=True)
-            pages.lines(manifest.description, BODY, after=0.1)
-            pages.lines(" ".join(circumstances(manifest)), SMALL_PRINT, after=0.2)
-            if costs := cost_table(manifest):
-                pages.table(costs)
-            for section in sections:
-                _set_section(pages, section)
-            pages.finish()
-    return buffer.getvalue()
+    parts: dict[str, str] = {}
+    costs = cost_table(manifest)
+    document = {
+        "title": manifest.title or manifest.campaign,
+        "campaign": manifest.campaign,
+        "description": manifest.description,
+        "run": " ".join(circumstances(manifest)),
+        "changed": CHANGED,
+        "changes": list(changes(manifest)),
+        "paper": PAPERS[paper],
+        "costs": _table(costs) if costs else None,
+        "sections": [
+            {"title": section.title, "key": section.key, "blocks": list(_blocks(section, style, parts))}
+            for section in sections
+        ],
+    }
+    template = files("workbench.report").joinpath("templates", "report.typ").read_text("utf-8")
+    return _compiled(template, parts | {"report.json": json.dumps(document, allow_nan=False)})
 
 
-def figure_pdf(plot: Plot) -> bytes:
+def figure_pdf(plot: Plot, style: str = "page") -> bytes:
     """Return one figure as a PDF of its own size, for a paper."""
-    figure = new_figure(*plot.size)
-    plot.draw(figure)
-    buffer = io.BytesIO()
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph")
-        figure.savefig(buffer, format="pdf", metadata={"Title": plot.caption, "Producer": None, "CreationDate": None})
-    return buffer.getvalue()
+    return _compiled(FIGURE, {"figure.svg": _drawing(plot, style)})
 
 
 def all_tables(sections: Sequence[Section]) -> list[Table]:
@@ -214,72 +82,145 @@ def all_tables(sections: Sequence[Section]) -> list[Table]:
     return tables + [table for view in views for table in view.tables]
 
 
-def _set_section(pages: Pages, section: Section) -> None:
+def _compiled(main: str, parts: Mapping[str, str]) -> bytes:
+    # a mapping is a folder in memory; the library's stub has forgotten it
+    sources: Any = {name: text.encode() for name, text in {"main.typ": main, **parts}.items()}
+    return typst.compile(sources, font_paths=_fonts(), ignore_system_fonts=True, format="pdf")
+
+
+@cache
+def _fonts() -> typst.Fonts:
+    folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
+    return typst.Fonts(include_system_fonts=False, font_paths=[str(folder)])
+
+
+def _drawing(plot: Plot, style: str) -> str:
+    return standalone(plot.svg, plot.alt).replace("font-family: sans-serif", f"font-family: {FONTS[style]}")
+
+
+def _picture(content: bytes) -> str:
+    """A picture of pixels as SVG: Typst takes sources in memory as text alone."""
+    with Image.open(io.BytesIO(content)) as image:
+        width, height = image.size
+        buffer = io.BytesIO()
+        image.convert("RGB").save(buffer, format="png")
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    size = f'width="{width}" height="{height}"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size}><image {size} href="data:image/png;base64,{data}"/></svg>'
+
+
+def _blocks(section: Section, style: str, parts: dict[str, str]) -> Iterator[Block]:
+    """The blocks of a section, in order; drawings and pictures go to *parts*."""
     context = section.context
-    pages.room(1.5)
-    pages.lines(section.title, 12.5, bold=True, after=0.12)
     if "sentence" in context:
-        status = context["status"]
-        pages.lines(f"{status.symbol} {status.text}: {context['sentence']}", BODY + 1, bold=True, after=0.2)
+        yield {"kind": "verdict", **_badge(context["status"]), "sentence": context["sentence"]}
+    if context.get("about"):
+        yield _text(context["about"])
+    for name, found in context.get("diagnosis", {}).items():
+        told = f"What is wrong with {name}, held against MuJoCo's {found.reference} model part by part:"
+        yield _text(told)
+        yield {"kind": "points", "points": list(found.findings)}
+        yield _text("More, and what would mend it:")
+        yield {"kind": "code", "text": found.command}
     for text in context.get("paragraphs", ()):
-        pages.lines(text, BODY, after=0.15)
+        yield _text(text)
     if context.get("command"):
-        pages.lines(context["command"], BODY, after=0.15)
-    for table in context.get("tables", ()):
-        pages.table(table)
-    for point in context.get("points", ()):
-        pages.lines(f"• {point}", BODY)
+        yield {"kind": "code", "text": context["command"]}
+    if context.get("note"):
+        yield _text(context["note"])
     views = context.get("views", ())
+    cases = [view for view in views if isinstance(view, CaseView)]
+    if not cases:
+        yield from _figures(section, views, style, parts)
+    yield from map(_table, context.get("tables", ()))
+    if context.get("points"):
+        yield {"kind": "points", "points": list(context["points"])}
+    for view in cases:
+        yield from _case(view, style, parts)
+
+
+def _figures(section: Section, views: Iterable[Any], style: str, parts: dict[str, str]) -> Iterator[Block]:
+    """Figures of a section of its own: those of the campaign have titles and sources, or a reason why they are not."""
+    titles = {}
     for view in views:
-        if isinstance(view, CaseView):
-            _set_case(pages, view)
-    if not any(isinstance(view, CaseView) for view in views):
-        pages.plots(section.plots)
+        record = view.record
+        told = " ".join(text for text in (record.title, f"{record.source}." if record.source else "") if text)
+        if view.plot is None:
+            yield _text(f"{told} {view.missing}")
+        else:
+            names = ", ".join(name for name, _ in view.cases)
+            titles[view.plot.key] = f"{told} {'Case' if len(view.cases) == 1 else 'Cases'} {names}."
+    yield from _plots(section.plots, style, parts, titles)
 
 
-def _set_case(pages: Pages, view: CaseView) -> None:
-    pages.room(2.5)
-    pages.lines(f"{view.heading} ({view.name}): {view.status.symbol} {view.status.text}", 11.0, bold=True)
-    for text in (view.record.description, view.record.message, *view.record.warnings):
-        if text:
-            pages.lines(text, BODY)
-    pages.lines("; ".join(f"{what.lower()} {value}" for what, value in view.facts), BODY, after=0.15)
-    pages.plots(view.plots)
+def _case(view: CaseView, style: str, parts: dict[str, str]) -> Iterator[Block]:
+    yield {"kind": "case", "title": view.heading, "name": view.name, "key": view.anchor, **_badge(view.status)}
+    if view.record.description:
+        yield _text(view.record.description)
+    if view.record.message:
+        yield {"kind": "notice", "text": view.record.message}
+    for warning in view.record.warnings:
+        yield {"kind": "notice", "text": f"Warning: {warning}"}
+    yield {"kind": "facts", "facts": [list(fact) for fact in view.facts]}
+    yield from _plots(view.plots, style, parts, {})
     if view.film is not None and view.film.still:
-        pages.picture(view.film.still, "The robot's model as MuJoCo renders it, at the first moment of this case")
-    for table in view.tables:
-        pages.table(table)
+        name = f"{view.anchor}-still.svg"
+        parts[name] = _picture(view.film.still)
+        caption = "The robot's model as MuJoCo renders it, at the first moment of this case"
+        yield {"kind": "plots", "plots": [_figure(name, caption, view.film.alt)], "wide": False}
+    yield from map(_table, view.tables)
 
 
-def _part(page: Figure, left: float, top: float, width: float, height: float) -> FigureBase:
-    """Return a part of the page, inches from its upper left corner, to draw a whole figure into."""
-    below = A4[1] - top - height
-    grid = page.add_gridspec(
-        3, 3, width_ratios=[left, width, A4[0] - left - width], height_ratios=[top, height, below], wspace=0, hspace=0
-    )
-    part = page.add_subfigure(grid[1, 1])
-    part.set_facecolor("none")
-    return part
+def _plots(plots: Sequence[Plot], style: str, parts: dict[str, str], titles: Mapping[str, str]) -> Iterator[Block]:
+    """Figures two in a row, wide ones alone, each above its caption."""
+    row: list[Block] = []
+    for plot in plots:
+        name = f"{plot.key}.svg"
+        parts[name] = _drawing(plot, style)
+        shown = _figure(name, titles.get(plot.key, plot.caption), plot.alt)
+        if plot.size[0] > FULL_WIDTH_FROM:
+            yield {"kind": "plots", "plots": [shown], "wide": True}
+        else:
+            row.append(shown)
+        if len(row) == 2:
+            yield {"kind": "plots", "plots": row, "wide": False}
+            row = []
+    if row:
+        yield {"kind": "plots", "plots": row, "wide": False}
+
+
+def _figure(file: str, caption: str, alt: str) -> Block:
+    return {"file": file, "caption": caption, "alt": alt}
+
+
+def _text(text: str) -> Block:
+    return {"kind": "text", "text": text}
+
+
+def _badge(status: Status) -> Block:
+    return {"status": status.key, "badge": f"{status.symbol} {status.text}".strip()}
+
+
+def _table(table: Table) -> Block:
+    longest = [max((len(_shown(row[number])) for row in table.rows), default=0) for number in range(len(table.columns))]
+    return {
+        "kind": "table",
+        "shows": table.shows,
+        "columns": [
+            {"title": column.title, "numeric": column.numeric, "long": length > LONG}
+            for column, length in zip(table.columns, longest, strict=True)
+        ],
+        "rows": [
+            [{"text": _shown(cell), "strong": cell.emphasis, "link": cell.link or "", **_colour(cell)} for cell in row]
+            for row in table.rows
+        ],
+        "reading": table.reading,
+    }
+
+
+def _colour(cell: Cell) -> Block:
+    return {"status": cell.status.key if cell.status else ""}
 
 
 def _shown(cell: Cell) -> str:
     return f"{cell.status.symbol} {cell.status.text}".strip() if cell.status else cell.text
-
-
-def _wrapped(text: str, letters: int) -> list[str]:
-    return textwrap.wrap(text, max(letters - 2, 1)) or [""]
-
-
-def _column_widths(table: Table, letters: int) -> list[int]:
-    """Share a line's letters among the columns: what they need, or as much of it as there is."""
-    needs = []
-    for number, column in enumerate(table.columns):
-        texts = [column.title if len(table.rows) < 1 else "", *(_shown(row[number]) for row in table.rows)]
-        longest = max(map(len, texts))
-        needs.append(max(longest, max(map(len, column.title.split()), default=0)) + 3)
-    while sum(needs) > letters:
-        widest = max(range(len(needs)), key=needs.__getitem__)
-        if needs[widest] <= NARROWEST:
-            break
-        needs[widest] -= 1
-    return needs

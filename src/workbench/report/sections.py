@@ -17,7 +17,7 @@ from workbench.report.manifest import FigureRecord, Manifest
 from workbench.report.pictures import film_of
 from workbench.report.plot import Plot
 from workbench.report.section import Section
-from workbench.report.tables import CASE_STATUS, CHECKED, NOT_COMPUTED, Cell, Table, columns
+from workbench.report.tables import CHECKED, NOT_COMPUTED, Cell, Table, columns
 from workbench.report.text import error_fraction, exact, pretty_unit, scientific, slug
 from workbench.report.verdict_section import verdict_section
 
@@ -101,7 +101,7 @@ def cases_section(run: Run, views: list[CaseView]) -> Section:
             (
                 Cell(view.name, link=view.anchor),
                 Cell(view.record.title),
-                Cell(status=CASE_STATUS[view.record.status]),
+                Cell(status=view.status),
                 Cell("–" if view.record.samples is None else str(view.record.samples), view.record.samples),
                 Cell(exact(view.record.peak_speed), view.record.peak_speed),
                 Cell(exact(view.record.peak_acceleration), view.record.peak_acceleration),

@@ -12,7 +12,7 @@ from workbench.report.manifest import CaseRecord
 from workbench.report.plot import Plot
 from workbench.report.style import PALETTE
 from workbench.report.tables import Cell, Table, columns
-from workbench.report.text import exact, pretty_unit
+from workbench.report.text import exact, torque_label
 
 PARTS = ("weight", "acceleration", "velocity", "springs", "friction", "external force")
 """In the order in which they are stacked."""
@@ -49,7 +49,7 @@ def spent_plot(run: Run, case: str, key: str, series: Series) -> Plot | None:
                         linewidth=0, label=part if side is edges[0] else None,
                     )  # fmt: skip
             axes.plot(time, tau.sum(axis=0), color="black", linewidth=0.8)
-            axes.set_ylabel(f"{joint} [{pretty_unit(unit)}]")
+            axes.set_ylabel(torque_label(joint, unit))
         figure_legend(figure, panels[0], columns=3)
 
     return Plot(
@@ -91,7 +91,7 @@ def spent_table(run: Run, record: CaseRecord, anchor: str) -> Table:
             if any(sizes.get(joint) for joint in joints):
                 cells = [Cell(exact(sizes.get(joint), 3), sizes.get(joint)) for joint in joints]
                 rows.append((Cell(name), Cell(what), *cells))
-    titles = [f"{joint} [{pretty_unit(unit)}]" for joint, unit in zip(joints, units, strict=True)]
+    titles = [torque_label(joint, unit) for joint, unit in zip(joints, units, strict=True)]
     return Table(
         f"{anchor}-spent",
         "What the torque is spent on: the reference's, under its"

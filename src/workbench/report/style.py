@@ -72,11 +72,13 @@ PAPER: Any = STYLE | {
     "xtick.top": True,
     "ytick.right": True,
     "lines.linewidth": 1.0,
-    "pdf.fonttype": 42,
 }
-"""For a column of a paper: serif letters, a closed frame, no grid, fonts that editors can embed."""
+"""For a column of a paper: serif letters, a closed frame, no grid."""
 
 STYLES = {"page": STYLE, "paper": PAPER}
+
+PAPERS = {"a4": "a4", "letter": "us-letter"}
+"""Sizes of a PDF's pages, and what Typst calls them."""
 
 
 @contextmanager

@@ -23,12 +23,11 @@ ERROR = Status("error", "⚠", "ERROR, not computed", loud=True)
 MEASURED = Status("measured", "", "measured")
 HOLDS = Status("passed", "✓", "holds")
 REFUTED = Status("refuted", "✗", "does not hold")
+NOT_ABOUT = Status("unjudged", "–", "not about this robot")
 UNDECIDED = Status("undecided", "?", "cannot be decided")
 
 EXPECTED_FAIL = Status("expected", "≠", "declared failure, seen")
 UNEXPECTED_PASS = Status("failed", "✗", "DECLARED FAILURE, NOT SEEN", loud=True)
-PASSED_VERDICT = Status("passed", "✓", "PASSED", loud=True)
-ERROR_VERDICT = Status("error", "⚠", "ERROR", loud=True)
 UNDECIDED_VERDICT = Status("undecided", "?", "UNDECIDED", loud=True)
 
 CASE_STATUS = {
@@ -36,12 +35,14 @@ CASE_STATUS = {
     "failed": FAILED,
     "error": ERROR,
     "undecided": UNDECIDED_VERDICT,
+    "nothing-judged": Status("unjudged", "–", "nothing judged"),
+    "not-driven": Status("error", "⚠", "CANNOT BE DRIVEN", loud=True),
     "invalid": Status("invalid", "⊘", "invalid, not computed"),
     "timeout": Status("timeout", "◷", "TIMED OUT", loud=True),
     "killed": Status("killed", "☠", "KILLED", loud=True),
     "filtered": Status("filtered", "", "filtered out"),
 }
-NOT_COMPUTED = frozenset({"error", "invalid", "timeout", "killed", "filtered"})
+NOT_COMPUTED = frozenset({"error", "not-driven", "invalid", "timeout", "killed", "filtered"})
 """Statuses of cases that have no series."""
 VERDICT_STATUS = {
     "pass": PASSED,
@@ -57,7 +58,7 @@ FAILURES = frozenset({"fail", "unexpected-pass", "undecided"})
 """Verdicts that fail a campaign."""
 CHECKED = frozenset({"pass", "fail", "undecided"})
 """Verdicts of rows that have a bound to keep."""
-KINDS = ("verification", "expected-failure", "modelling", "recorded", "contrast")
+KINDS = ("verification", "expected-failure", "modelling", "unbounded", "recorded", "contrast")
 """Families of rows, which a table never mixes."""
 
 CLAIM_STATUS = {True: HOLDS, False: REFUTED, None: UNDECIDED}

@@ -15,6 +15,7 @@ WHOLE_PERCENT_FROM = 9.995
 """From this fraction on, a percentage is written in whole numbers and not as a power of ten."""
 
 _MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]|#~$])")
+_NUMBERED = re.compile(r"q(\d+)")
 _LINE_START = re.compile(r"^(?:([-+=])(?=[-=\s]|$)|(\d{1,9})([.)])(?=\s|$))")
 
 
@@ -68,6 +69,12 @@ def count(value: int | None) -> str:
 def pretty_unit(unit: str) -> str:
     """Write ``N m`` as ``N·m`` and ``m/s2`` as ``m/s²``."""
     return re.sub(r"(?<=[a-z])\^?2(?![0-9])", "²", unit.strip()).replace(" ", "·")
+
+
+def torque_label(joint: str, unit: str) -> str:
+    """Name an actuated joint's generalized force: ``τ2 [N·m]`` of q2, ``τ crank [N·m]`` of a joint called crank."""
+    number = _NUMBERED.fullmatch(joint)
+    return f"τ{number[1] if number else ' ' + joint} [{pretty_unit(unit)}]"
 
 
 def with_unit(text: str, unit: str) -> str:

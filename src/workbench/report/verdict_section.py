@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
+from workbench.campaign.changed import sentences
+from workbench.report.concluded import LOOKS, conclusion_of
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
 from workbench.report.section import Section
-from workbench.report.tables import (
-    CHECKED,
-    ERROR_VERDICT,
-    FAILED,
-    FAILURES,
-    NOT_COMPUTED,
-    PASSED_VERDICT,
-    UNDECIDED_VERDICT,
-    Cell,
-    Status,
-    Table,
-    columns,
-)
-from workbench.report.text import exact, scientific
+from workbench.report.tables import Cell, Status, Table, columns
 
 
 def verdict_section(run: Run) -> Section:
@@ -66,56 +55,15 @@ def circumstances(manifest: Manifest) -> tuple[str, ...]:
     return tuple(f"{text}." for text in told if text)
 
 
-def verdict(run: Run) -> tuple[Status, str]:
-    """Return the overall status and the sentence; a failed row or case is never hidden by the manifest's own status."""
-    cases = run.manifest.cases
-    checks = [row for row in run.rows if row.verdict in CHECKED]
-    failed = [row for row in checks if row.verdict == "fail"]
-    undecided = [row for row in run.rows if row.verdict == "undecided"]
-    declared = [row for row in run.rows if row.verdict in ("expected-fail", "unexpected-pass")]
-    unseen = [row for row in declared if row.verdict == "unexpected-pass"]
-    broken = [name for name, record in cases.items() if record.status in NOT_COMPUTED]
-    # A case can fail with every row within its bound: its kinematics disagree, and its message says so.
-    accused = {row.case for row in run.rows if row.verdict in FAILURES}
-    other = [name for name, record in cases.items() if record.status == "failed" and name not in accused]
+def changes(manifest: Manifest) -> list[str]:
+    """Say what was changed of the robot that the claims are about, a sentence each; empty where nothing was."""
+    return sentences(manifest.changes.model, manifest.changes.parameters, list(manifest.cases))
 
-    worst = max(checks, key=lambda row: row.badness, default=None)
-    where = ""
-    if worst is not None:
-        where = (
-            f"worst is {worst.candidate} on joint {worst.joint} in case {worst.case}: "
-            f"{scientific(worst.peak_error)} of the "
-            f"reference's peak against a bound of {exact(worst.bound)}"
-        )
-    bad = []
-    if failed:
-        bad.append(f"{len(failed)} of {len(checks)} checks exceed their bound ({where})")
-    if undecided:
-        bad.append(
-            f"{len(undecided)} of {len(checks)} checks are undecided, because the reference's own uncertainty is not "
-            f"below a tenth of the bound ({', '.join(dict.fromkeys(row.case for row in undecided))})"
-        )
-    if unseen:
-        bad.append(f"{len(unseen)} of {len(declared)} declared failures did not happen")
-    if other:
-        bad.append(f"{_cases(len(other))} failed for another reason ({', '.join(other)})")
-    if broken:
-        bad.append(f"{len(broken)} of {_cases(len(cases))} could not be computed ({', '.join(broken)})")
-    if failed or unseen or other or (run.manifest.status == "failed" and not undecided):
-        return FAILED, f"{', and '.join(bad) or 'the run says so, though no row of it does'}."
-    if undecided:
-        held = f"; the other {len(checks) - len(undecided)} hold their bounds" if len(checks) > len(undecided) else ""
-        return UNDECIDED_VERDICT, f"{', and '.join(bad)}{held}."
-    if broken or run.manifest.status == "error":
-        held = f"; the {len(checks)} checks that were made hold their bounds" if checks else ""
-        return ERROR_VERDICT, f"{', and '.join(bad) or 'the run ended in an error'}{held}."
-    seen = f"all {len(declared)} declared failures show" if declared else ""
-    if not checks:
-        if not declared:
-            return UNDECIDED_VERDICT, "no formula was held against a bound, so nothing is verified."
-        return PASSED_VERDICT, f"{seen} in {_cases(len(cases))}; no other check was made."
-    also = f", and {seen}" if seen else ""
-    return PASSED_VERDICT, f"all {len(checks)} checks in {_cases(len(cases))} hold their bounds{also}; {where}."
+
+def verdict(run: Run) -> tuple[Status, str]:
+    """Return the look of the run's verdict and its sentence."""
+    found = conclusion_of(run)
+    return LOOKS[found.status], found.sentence
 
 
 def _cases(number: int) -> str:

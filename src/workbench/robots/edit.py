@@ -18,6 +18,9 @@ from workbench.robots.inertia import refuse_impossible_bodies
 from workbench.robots.load import LoadedModel, load_edited, no_parameters, read_base, refuse_computed
 from workbench.robots.values import rewrite
 
+MANY = 10.0
+"""Lengths and masses that change by such a factor are warned of."""
+MEANT = "; lengths are in metres"
 COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
 NUMBER = re.compile(r"(?<![\w.-])\d+\.?\d*(?:[eE][-+]?\d+)?(?!\w)")
 MILLIMETRES = 1000.0
@@ -45,6 +48,16 @@ class EditResult:
     """numbers of the lines that changed, from 1"""
     stale: tuple[int, ...] = ()
     """lines of comments that name a number as it was before"""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Lengths and masses that became many times larger or smaller, each with its factor."""
+        return tuple(
+            f"{change.name} = {change.after:g} {change.unit} is {_times(change)} what it was ({change.before:g}"
+            f" {change.unit}){MEANT if change.unit == 'm' else ''}"
+            for change in self.changes
+            if change.unit in ("m", "kg") and change.before and not 1 / MANY < change.after / change.before < MANY
+        )
 
 
 def resolve_for(path: str | Path, changes: Sequence[str]) -> dict[str, float]:
@@ -135,7 +148,14 @@ def edit_file(
         for name, info in described.table.infos.items()
         if after[name] != values[name]
     )
-    return EditResult(source, target, moved, changed_lines(loaded.text, text), tuple(_stale(text, moved)))
+    return EditResult(
+        source, target, moved, changed_lines(loaded.text, text), tuple(dict.fromkeys(_stale(text, moved)))
+    )
+
+
+def _times(change: Change) -> str:
+    factor = change.after / change.before
+    return f"{factor:.4g} times" if abs(factor) >= 1 or not factor else f"1/{1 / factor:.4g} of"
 
 
 def _stale(text: str, moved: Sequence[Change]) -> Iterator[int]:
@@ -143,8 +163,13 @@ def _stale(text: str, moved: Sequence[Change]) -> Iterator[int]:
     old = {size * change.before for change in moved for size in (1.0, MILLIMETRES if change.unit == "m" else 1.0)}
     for comment in COMMENT.finditer(text):
         for number in NUMBER.finditer(text, comment.start(1), comment.end(1)):
-            if float(number.group()) in old and len(number.group().strip("0.")) > 1:
+            if float(number.group()) in old and _tells(number.group()):
                 yield text.count("\n", 0, number.start()) + 1
+
+
+def _tells(number: str) -> bool:
+    """Whether a number in a comment is more than a counter: a fraction, or two digits and more."""
+    return "." in number or len(number.strip("0")) > 1 or len(number) > 2
 
 
 def changed_lines(before: str, after: str) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from workbench.mjcf.text import find, scan, written
 from workbench.robots.load import no_parameters, read_base
 from workbench.robots.parameters import Target
+from workbench.robots.published import source_of
 
 SCALARS = ("mass", "damping", "frictionloss", "armature", "stiffness", "density")
 """Attributes that hold one number."""
@@ -23,7 +24,7 @@ class ParameterRow:
     unit: str
     meaning: str
     source: str
-    """where the value of the bundled model comes from"""
+    """where the value comes from"""
     element: str
     """MJCF element that it is read from: ``inertial of rod_left``"""
     attribute: str
@@ -69,7 +70,7 @@ def show_parameters(path: str | Path) -> list[ParameterRow]:
                 value=loaded.values[name],
                 unit=info.unit,
                 meaning=info.meaning,
-                source=info.source,
+                source=source_of(loaded.description, name, loaded.values[name]),
                 element=_element(target, place[0].tag if place else target.element),
                 attribute=_attribute(target, place[1] if place else target.attribute),
                 rule=_rule(target),

@@ -13,9 +13,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.campaign import store
+from workbench.campaign.changes import Variant, changes_of
+from workbench.campaign.conclusion import Conclusion
 from workbench.campaign.evidence import Effort
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
+from workbench.campaign.replacing import Request, asked_for, request_of
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import full_names, load_candidates, with_rows
 from workbench.errors import OutputError, SpecError, WorkbenchError
@@ -28,7 +31,7 @@ from workbench.sweep.journal import Journal
 from workbench.sweep.plan import Plan, plan_sweep
 from workbench.sweep.progress import Meter, Show
 from workbench.sweep.record import lost
-from workbench.sweep.statistics import passed, summarise
+from workbench.sweep.statistics import concluded, summarise
 from workbench.sweep.supervisor import Lost, Setup, Supervisor
 
 SYNC_EVERY_S = 5.0
@@ -51,16 +54,23 @@ class SweepOptions:
     """start over, dropping what is finished"""
     retry_failed: bool = False
     """compute again what failed, was killed or ran out of time"""
+    replace: bool = False
+    """put the sweep in the place of an earlier run of another robot, of other cases or candidates"""
 
 
 @dataclass(frozen=True)
 class SweepOutcome:
-    """A finished sweep: where it lies, whether every case passed, and its summary."""
+    """A finished sweep: where it lies, the verdict on it, and its summary."""
 
     directory: Path
-    passed: bool
+    conclusion: Conclusion
     summary: dict[str, Any]
     manifest: dict[str, Any]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every case that was not left out holds its bounds, and there is one that was held against any."""
+        return self.conclusion.passed
 
 
 class Pool(Protocol):
@@ -150,10 +160,15 @@ def run_sweep(
     context = Context(
         campaign, file.resolve(), plan.model.resolve(), dict(settings or {}), effort, plan.recipe, common, names
     )
+    request = request_of(model, settings or {}, (), (), candidates)
     with locked(directory):
+        try:
+            aside = _put_aside(directory, campaign, request, options)
+        except OSError as error:
+            raise _refused(directory, error, 0, plan.count) from error
         done, new = 0, not directory.exists()
         try:
-            _prepare(directory, campaign, options)
+            _prepare(directory, campaign, request, options)
             with state.open_journal(directory, plan, common, options.retry_failed) as journal:
                 state.remove_stray_series(directory, plan, journal.__contains__)
                 done = sum(journal.counts().values())
@@ -162,8 +177,9 @@ def run_sweep(
                 done += computed
                 files.write_parts(directory, plan, journal)
             summary = summarise(directory, plan, campaign)
-            manifest = _manifest(campaign, file, plan, summary) | {
+            manifest = _manifest(campaign, file, plan, summary, model, settings or {}) | {
                 "command": shlex.join(command),
+                "request": request,
                 "started": started.isoformat(timespec="seconds"),
                 "finished": datetime.now(UTC).isoformat(timespec="seconds"),
                 "seconds": round(time.perf_counter() - clock, 3),
@@ -175,6 +191,7 @@ def run_sweep(
             files.write_json(directory / store.MANIFEST, manifest)
             for name in files.WORKING:
                 (directory / name).unlink(missing_ok=True)
+            shutil.rmtree(aside, ignore_errors=True)
             if report:
                 report(directory)
         except OSError as error:
@@ -182,8 +199,10 @@ def run_sweep(
         except WorkbenchError:
             if new and not state.holds_cases(directory):
                 shutil.rmtree(directory, ignore_errors=True)
+                if aside.exists():
+                    aside.rename(directory)
             raise
-    return SweepOutcome(directory, passed(summary["counts"]), summary, manifest)
+    return SweepOutcome(directory, concluded(summary), summary, manifest)
 
 
 def _refused(directory: Path, error: OSError, done: int, total: int) -> OutputError:
@@ -191,15 +210,41 @@ def _refused(directory: Path, error: OSError, done: int, total: int) -> OutputEr
     return OutputError(f"{directory}: cannot be written: {error.strerror or error}{kept}", path=str(directory))
 
 
-def _prepare(directory: Path, campaign: Campaign, options: SweepOptions) -> None:
+def _put_aside(directory: Path, campaign: Campaign, request: Request, options: SweepOptions) -> Path:
+    """Where a finished earlier run is kept until the one that takes its place is finished; it may be empty.
+
+    Raises
+    ------
+    OutputError
+        The earlier run is of another robot or other candidates, and nobody said that it may be replaced.
+    """
+    place = directory.resolve()
+    aside = place.parent / f".{place.name[:100]}.before"
     if os.access(directory, os.W_OK):
         state.repair(directory)
     check_output(directory, files.RUN)
+    old = files.read_json(directory / files.STATE) or {}
+    before = old.get("request")
+    other = state.holds_cases(directory) and (
+        old.get("campaign") not in (campaign.name, "") or (before is not None and before != request)
+    )
+    if other and not (options.replace or options.fresh):
+        raise OutputError(
+            f"{directory}: holds cases of another sweep ({asked_for(old)}; here {asked_for({'request': request})});"
+            " --replace puts this one in its place, --out names another directory",
+            path=str(directory),
+        )
+    if (other or options.fresh) and (directory / store.MANIFEST).is_file() and not aside.exists():
+        place.rename(aside)
+    return aside
+
+
+def _prepare(directory: Path, campaign: Campaign, request: Request, options: SweepOptions) -> None:
     if options.fresh:
         state.clear(directory)
     else:
         state.refuse_other_versions(directory)
-    state.begin(directory, {"campaign": campaign.name})
+    state.begin(directory, {"campaign": campaign.name, "request": request})
 
 
 def _compute(
@@ -270,10 +315,21 @@ def _lost(context: Context, plan: Plan, index: int, found: Lost) -> Answer:
     return Answer(lost(index, key, found.status, found.reason))
 
 
-def _manifest(campaign: Campaign, file: Path, plan: Plan, summary: Mapping[str, Any]) -> dict[str, Any]:
-    return describe(campaign, file, plan.model, plan.robot) | {
+def _manifest(
+    campaign: Campaign,
+    file: Path,
+    plan: Plan,
+    summary: Mapping[str, Any],
+    model: Path | None,
+    settings: Mapping[str, float],
+) -> dict[str, Any]:
+    name = campaign.case[0].name
+    variant = Variant(name, plan.robot, campaign.case[0].parameters)
+    changes = changes_of(campaign, file, model, settings, (), [variant])
+    return describe(campaign, file, plan.model, plan.robot, name, changes) | {
         "format": store.FORMAT,
-        "status": "passed" if passed(summary["counts"]) else "failed",
+        "status": concluded(summary).status,
+        "verdict": concluded(summary).sentence,
         "candidates": {
             c.name: {
                 "mass_model": plan.robot.candidates[c.name].mass_model,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,13 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from workbench.arrays import FloatArray
+from workbench.campaign.conclusion import Conclusion, conclude_sweep
 from workbench.campaign.spec import Campaign
-from workbench.campaign.verdict import CONTRAST
+from workbench.campaign.verdict import CONTRAST, MODELLING, UNBOUNDED, VERIFICATION, kind_of
 from workbench.sweep import files
 from workbench.sweep.identity import FORMAT
 from workbench.sweep.plan import Plan
-from workbench.sweep.record import GOOD, PASSED, STATUSES
+from workbench.sweep.record import STATUSES
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
 BINS = 10
@@ -37,14 +38,17 @@ def summarise(directory: Path, plan: Plan, campaign: Campaign) -> dict[str, Any]
     assert campaign.sweep is not None
     statuses, reasons, examples = _statuses(directory)
     errors = _errors(directory, plan, campaign)
-    kinds = {(c.name, c.reference): "verification" if c.bound is not None else "modelling" for c in campaign.candidate}
+    own = {c.name: plan.robot.candidates[c.name].mass_model for c in campaign.candidate}
+    kinds = {
+        (c.name, c.reference): kind_of(c, own[c.name]) if c.bound is None else VERIFICATION for c in campaign.candidate
+    }
     rows = [
         {"candidate": candidate, "reference": reference, "kind": kinds[candidate, reference], "joint": joint}
         | _distribution(values, plan, campaign.sweep.good)
         for (candidate, reference), table in errors.items()
         for joint, values in table.items()
     ]
-    measured = {pair: table for pair, table in errors.items() if kinds[pair] == "modelling"}
+    measured = {pair: table for pair, table in errors.items() if kinds[pair] in (MODELLING, UNBOUNDED)}
     return {
         "format": FORMAT,
         "campaign": campaign.name,
@@ -187,6 +191,7 @@ def _worst(pair: tuple[str, str], table: dict[str, FloatArray], plan: Plan) -> l
     ]
 
 
-def passed(counts: dict[str, int]) -> bool:
-    """Tell whether every case is passed or left out on purpose, and at least one is passed: none is no proof."""
-    return counts[PASSED] > 0 and not any(n for status, n in counts.items() if status not in GOOD)
+def concluded(summary: Mapping[str, Any]) -> Conclusion:
+    """The verdict on a sweep from its summary."""
+    bounded = any(row["kind"] == VERIFICATION for row in summary["errors"])
+    return conclude_sweep(summary["counts"], bounded)

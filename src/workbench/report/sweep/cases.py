@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from workbench.campaign.conclusion import GOOD
 from workbench.report.section import Section
 from workbench.report.sweep.load import SweepRun
-from workbench.report.sweep.summary import MODELLING
+from workbench.report.sweep.summary import MEASURED
 from workbench.report.sweep.varied import label_of
-from workbench.report.sweep.verdict import GOOD, number, status_of
+from workbench.report.sweep.verdict import number, status_of
 from workbench.report.tables import Cell, Table, columns
 from workbench.report.text import exact, percent, pretty_unit, scientific
 
@@ -27,11 +28,11 @@ def worst_section(run: SweepRun) -> Section | None:
     """List the designs with the largest errors, with what each of them is made of."""
     tables, names = [], []
     for place, (candidate, reference, kind) in enumerate(
-        sorted(run.summary.pairs, key=lambda pair: pair[2] != MODELLING)
+        sorted(run.summary.pairs, key=lambda pair: pair[2] not in MEASURED)
     ):
-        indices = worst_cases(run, (candidate, reference), WORST[kind == MODELLING])
+        indices = worst_cases(run, (candidate, reference), WORST[kind in MEASURED])
         if indices:
-            tables.append(_worst_table(run, place, candidate, reference, kind == MODELLING, indices))
+            tables.append(_worst_table(run, place, candidate, reference, kind in MEASURED, indices))
             names.append(run.name(indices[0]))
     if not tables:
         return None

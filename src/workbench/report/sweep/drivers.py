@@ -49,7 +49,7 @@ def drivers_section(run: SweepRun) -> Section | None:
             plots.append(_courses(run, f"figure-courses-{stem}", shown, bins, against))
         tables.append(_table(run, place, drivers, bins, against))
     context = {"paragraphs": [], "tables": tables, "figures": plots, "note": NOTE}
-    return Section("drivers", "What drives the modelling error", "sweep", context, tuple(plots))
+    return Section("drivers", "What drives the error", "sweep", context, tuple(plots))
 
 
 NOTE = (

@@ -14,7 +14,7 @@ from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.style import ALARM, INK, PALETTE
 from workbench.report.sweep.load import SweepRun
-from workbench.report.sweep.summary import ANY_JOINT, MODELLING, ErrorRecord
+from workbench.report.sweep.summary import ANY_JOINT, MEASURED, ErrorRecord
 from workbench.report.sweep.verdict import number
 from workbench.report.tables import Cell, Table, columns
 from workbench.report.text import exact, percent, scientific, slug
@@ -32,6 +32,10 @@ MATTERS = 0.06
 """Rank correlations below this are not named among what an error depends on."""
 
 
+WHAT = {"modelling": "Modelling error", "unbounded": "Error, nothing judged,"}
+"""What a comparison without a bound shows."""
+
+
 def limits_of(run: SweepRun, candidate: str, reference: str) -> tuple[float, ...]:
     """Return the limits that designs are counted below."""
     row = run.summary.row(candidate, reference, ANY_JOINT)
@@ -41,13 +45,13 @@ def limits_of(run: SweepRun, candidate: str, reference: str) -> tuple[float, ...
 
 def errors_section(run: SweepRun) -> Section | None:
     """Show, for each comparison, the distribution of the error over all designs; modelling errors first."""
-    pairs = sorted(run.summary.pairs, key=lambda pair: pair[2] != MODELLING)
+    pairs = sorted(run.summary.pairs, key=lambda pair: pair[2] not in MEASURED)
     known = [pair for pair in pairs if np.isfinite(run.worst[pair[:2]]).any()]
     if not known:
         return None
     plots, tables, answers = [], [], []
     for place, (candidate, reference, kind) in enumerate(known):
-        if kind == MODELLING:
+        if kind in MEASURED:
             answers.append(_answer(run, candidate, reference))
         key = f"figure-errors-{slug(candidate)}-{slug(reference)}-{place + 1}"
         plots.append(_distribution_plot(run, key, candidate, reference, kind))
@@ -116,7 +120,7 @@ def _dependence(run: SweepRun, candidate: str, reference: str) -> str:
 
 
 def _table(run: SweepRun, place: int, candidate: str, reference: str, kind: str) -> Table:
-    modelling = kind == MODELLING
+    modelling = kind in MEASURED
     write = percent if modelling else scientific
     limits = limits_of(run, candidate, reference) if modelling else ()
     bound = run.bounds.get((candidate, reference))
@@ -140,7 +144,7 @@ def _table(run: SweepRun, place: int, candidate: str, reference: str, kind: str)
             cells.append(Cell(exact(bound), bound))
         rows.append(tuple(cells))
     what = (
-        f"Modelling error of {candidate} against the {reference} reference, over all designs that were computed."
+        f"{WHAT[kind]} of {candidate} against the {reference} reference, over all designs that were computed."
         if modelling
         else f"Verification of {candidate} against the {reference} reference: what remains in any design is rounding."
     )
@@ -166,7 +170,7 @@ def _values(run: SweepRun, candidate: str, reference: str, joint: str) -> FloatA
 
 
 def _distribution_plot(run: SweepRun, key: str, candidate: str, reference: str, kind: str) -> Plot:
-    modelling = kind == MODELLING
+    modelling = kind in MEASURED
     bound = run.bounds.get((candidate, reference))
     joints = run.manifest.joints
     worst = np.maximum(_values(run, candidate, reference, ANY_JOINT), SMALLEST_DRAWN)

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 
+from workbench.campaign.conclusion import GOOD
 from workbench.report.section import Section
 from workbench.report.sections import NO_REAL_ROBOT, parameters_section, reproduce_section
 from workbench.report.sweep.cases import trouble_section, worst_section
@@ -15,7 +16,7 @@ from workbench.report.sweep.heat import heat_section
 from workbench.report.sweep.load import SweepRun
 from workbench.report.sweep.picker import picker_data
 from workbench.report.sweep.varied import varied_section
-from workbench.report.sweep.verdict import GOOD, number, verdict_section
+from workbench.report.sweep.verdict import number, verdict_section
 
 
 def sweep_sections(run: SweepRun) -> list[Section]:

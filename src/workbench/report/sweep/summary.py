@@ -13,6 +13,8 @@ FORMAT_VERSION = 1
 ANY_JOINT = "any"
 """stands for the largest error over the joints"""
 MODELLING = "modelling"
+MEASURED = (MODELLING, "unbounded")
+"""Kinds of comparisons that have no bound."""
 
 
 class KeyRecord(Record):

@@ -4,19 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from workbench.campaign.conclusion import conclude_sweep
+from workbench.report.concluded import LOOKS
 from workbench.report.section import Section
 from workbench.report.sweep.load import SweepRun
-from workbench.report.tables import (
-    ERROR_VERDICT,
-    FAILED,
-    PASSED,
-    PASSED_VERDICT,
-    UNDECIDED_VERDICT,
-    Cell,
-    Status,
-    Table,
-    columns,
-)
+from workbench.report.tables import FAILED, PASSED, Cell, Status, Table, columns
 from workbench.report.text import exact, percent, scientific
 from workbench.report.verdict_section import candidates_table, model_text
 
@@ -36,14 +28,6 @@ MEANING = {
     "killed": "the worker died: a crash, a signal, or too much memory",
     "filtered": "left out on purpose by the campaign's filter; nothing was computed, and nothing is known",
 }
-SAID = {
-    "failed": "failed",
-    "invalid": "gave results that are not finite numbers",
-    "timeout": "ran out of time",
-    "killed": "lost their worker",
-}
-"""What the sentence says of cases that did not pass."""
-GOOD = ("passed", "filtered")
 
 
 def status_of(name: str) -> Status:
@@ -92,25 +76,9 @@ def verdict_section(run: SweepRun) -> Section:
 
 
 def verdict(run: SweepRun) -> tuple[Status, str]:
-    """Return the overall status and the sentence with all counts."""
-    summary = run.summary
-    counts = {name: count for name, count in summary.counts.items() if count}
-    total = number(summary.cases)
-    passed, left_out = counts.get("passed", 0), counts.get("filtered", 0)
-    out = f"{number(left_out)} of {total} {_were(left_out)} left out by the filter" if left_out else ""
-    bad = {name: count for name, count in counts.items() if name not in GOOD}
-    if bad:
-        parts = [f"{number(count)} {SAID.get(name, name)}" for name, count in bad.items()]
-        rest = [f"{number(passed)} passed", *([out] if out else [])]
-        # a lost or broken case is not a formula that failed; nothing is known of it
-        status = FAILED if "failed" in bad else ERROR_VERDICT
-        return status, f"of {total} cases {_joined(parts)}; {_joined(rest)}."
-    if not passed:
-        return UNDECIDED_VERDICT, f"all {total} cases were left out by the filter, so nothing is verified."
-    if not run.bounds:
-        return UNDECIDED_VERDICT, f"no formula was held against a bound in {number(passed)} cases; nothing is verified."
-    what = f"all {number(passed)} cases that were computed" if left_out else f"all {total} cases"
-    return PASSED_VERDICT, f"{what} hold every bound ({_worst(run)}){f'; {out}' if out else ''}."
+    """Return the look of the sweep's verdict and its sentence with all counts."""
+    found = conclude_sweep(run.summary.counts, bool(run.bounds), _worst(run) if run.bounds else "")
+    return LOOKS[found.status], found.sentence
 
 
 def _worst(run: SweepRun) -> str:
@@ -124,11 +92,3 @@ def _worst(run: SweepRun) -> str:
         f"worst is {pair[0]} on joint {joint} in case {run.name(index)}: {scientific(float(run.worst[pair][index]))} "
         f"of the reference's peak against a bound of {exact(run.bounds[pair])}"
     )
-
-
-def _were(count: int) -> str:
-    return "was" if count == 1 else "were"
-
-
-def _joined(parts: list[str]) -> str:
-    return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]

@@ -161,14 +161,16 @@ class Asym2rssPpap(ClosedForm):
 
     def mobility_count(self) -> dict[str, int]:
         """Gogu's count, each dimension from the rank of screws; the paper states M = 3 without one."""
-        from workbench.robots.asym_2rss_ppap.mobility import POSE, gogu_mobility
+        from workbench.robots.asym_2rss_ppap.mobility import generic_poses, gogu_mobility
 
-        q = np.array(POSE)
-        try:
-            x = self.forward_kinematics(q[None, :])[0]
-        except MotionError:  # limbs that do not reach this pose; the count is structural and any pose tells it
-            return {}
-        return gogu_mobility(self._parameters, x, q)
+        for q in generic_poses(self._parameters):  # the count is structural: any pose without symmetry tells it
+            try:
+                x = self.forward_kinematics(q[None, :])[0]
+            except MotionError:
+                continue
+            if abs(x[1]) < self._parameters.a5:
+                return gogu_mobility(self._parameters, x, q)
+        return {}
 
     def joint_motion(self, x: ArrayLike, xd: ArrayLike, xdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Actuated motion from a platform motion, elbows out.

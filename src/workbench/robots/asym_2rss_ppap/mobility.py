@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,18 @@ POSE = (0.03, 0.7, 0.9)
 """q1 in metres, q2 and q3 in radians: a pose without any symmetry that could hide a freedom or add one."""
 
 X1, X3 = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+
+
+ANGLES, APART = 48, 0.2
+"""Arm angles that are tried for a robot of other lengths; those of the two arms differ by so much, rad."""
+
+
+def generic_poses(parameters: Any) -> Iterator[FloatArray]:
+    """Actuated coordinates ``(3,)`` without symmetry: `POSE`, then others for robots that do not reach it."""
+    yield np.array(POSE)
+    shift = 0.1 * min(parameters.a2_left, parameters.a2_right)
+    for angle in np.linspace(-np.pi, np.pi, ANGLES, endpoint=False) + 0.013:
+        yield np.array([shift, angle, angle + APART])
 
 
 def gogu_mobility(parameters: Any, x: FloatArray, q: FloatArray) -> dict[str, int]:

@@ -1,0 +1,202 @@
+"""What a row of errors means: bounds, declared failures, and whether the reference is good enough to say so."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from workbench.campaign.candidate_spec import CandidateSpec
+from workbench.campaign.claims import judge_claims
+from workbench.campaign.evidence import Evidence
+from workbench.campaign.spec import Campaign, CaseSpec, ClaimSpec
+from workbench.campaign.verdict import FAILURES, kind_of, verdict_of
+from workbench.reference.power import PLAIN, PowerBalance
+
+BOUND = 1e-10
+PLAINLY = CandidateSpec(name="x", reference="lumped", bound=BOUND)
+DECLARED = CandidateSpec(name="x", reference="lumped", bound=BOUND, expect_fail={"one": ["q1"]})
+MEASURED = CandidateSpec(name="x", reference="lumped")
+
+
+@pytest.mark.parametrize(
+    ("error", "plainly", "declared"),
+    [
+        (0.0, "pass", "unexpected-pass"),
+        (BOUND, "pass", "unexpected-pass"),
+        (1.001 * BOUND, "fail", "expected-fail"),
+        (math.inf, "fail", "fail"),
+        (math.nan, "fail", "fail"),
+    ],
+)
+def test_within_the_bound_or_not(error: float, plainly: str, declared: str) -> None:
+    assert verdict_of(PLAINLY, "one", "q1", error) == plainly
+    assert verdict_of(DECLARED, "one", "q1", error) == declared
+    # a failure is declared for one joint of one case
+    assert verdict_of(DECLARED, "one", "q2", error) == plainly
+    assert verdict_of(DECLARED, "two", "q1", error) == plainly
+    assert verdict_of(MEASURED, "one", "q1", error, 1.0) == "measured"
+
+
+@pytest.mark.parametrize(
+    ("error", "uncertainty", "verdict"),
+    [
+        # within: what the reference leaves open has to be under a tenth of the bound
+        (0.0, 0.09 * BOUND, "pass"),
+        (0.0, 0.11 * BOUND, "undecided"),
+        (0.9 * BOUND, 0.11 * BOUND, "undecided"),
+        # beyond: under a tenth of the error
+        (50 * BOUND, 4 * BOUND, "fail"),
+        (50 * BOUND, 6 * BOUND, "undecided"),
+        (math.inf, 1.0, "fail"),
+        # nobody looked
+        (0.0, math.nan, "pass"),
+        (50 * BOUND, math.nan, "fail"),
+    ],
+)
+def test_a_verdict_needs_a_reference_ten_times_as_good(error: float, uncertainty: float, verdict: str) -> None:
+    assert verdict_of(PLAINLY, "one", "q1", error, uncertainty) == verdict
+
+
+def test_what_fails_a_campaign() -> None:
+    assert {"fail", "unexpected-pass", "undecided"} == FAILURES
+
+
+def test_kinds_of_rows() -> None:
+    assert [kind_of(one) for one in (PLAINLY, DECLARED, MEASURED)] == ["verification", "expected-failure", "modelling"]
+
+
+def test_a_declared_failure_needs_a_bound() -> None:
+    with pytest.raises(ValueError, match="expect_fail needs a bound"):
+        CandidateSpec(name="x", reference="lumped", expect_fail={"one": ["q1"]})
+
+
+def test_a_bound_of_the_case_goes_over_the_candidates() -> None:
+    motion = {"kind": "rest", "q": [0.0], "samples": 2}
+    case = CaseSpec.model_construct(name="one", motion=motion, bounds={"q2": 1e-3})
+    assert PLAINLY.in_case(case, "q1").bound == BOUND
+    assert PLAINLY.in_case(case, "q2").bound == 1e-3
+    assert DECLARED.in_case(case, "q2").expect_fail == DECLARED.expect_fail
+    # what has no bound is measured, whatever the case says
+    assert MEASURED.in_case(case, "q2").bound is None
+
+
+def balance(relative: float, rounding: float = 0.0) -> PowerBalance:
+    none = np.zeros(1)
+    return PowerBalance(np.zeros(1, dtype=np.int64), none, none, none, none, none, 1.0, relative, 0, 0.0, rounding)
+
+
+KNOWN = {"power": 3e-9, "spread": 2e-9, "left open": 1e-9}
+
+
+@pytest.mark.parametrize("largest", KNOWN)
+def test_the_references_uncertainty_is_the_largest_that_is_known(largest: str) -> None:
+    worth = KNOWN | {largest: 5e-9}
+    evidence = Evidence(
+        power={"lumped": balance(worth["power"])},
+        spread={"lumped": {"q1": worth["spread"]}},
+        undetermined={"lumped": {"q1": worth["left open"]}},
+    )
+    assert evidence.uncertainty("lumped", "q1") == 5e-9
+    # what was not looked at on a joint or for a mass model says nothing of it
+    assert evidence.uncertainty("lumped", "q2") == worth["power"]
+    assert math.isnan(evidence.uncertainty("distributed", "q1"))
+
+
+def test_one_figure_alone_is_enough() -> None:
+    assert Evidence(spread={"lumped": {"q1": 7.0}}).uncertainty("lumped", "q1") == 7.0
+    assert Evidence(power={"lumped": balance(7.0)}).uncertainty("lumped", "q1") == 7.0
+    assert Evidence(undetermined={"lumped": {"q1": 7.0}}).uncertainty("lumped", "q1") == 7.0
+
+
+def test_a_balance_of_nothing_is_no_uncertainty_of_zero() -> None:
+    assert math.isnan(Evidence(power={"lumped": balance(math.nan)}).uncertainty("lumped", "q1"))
+
+
+@pytest.mark.parametrize(
+    ("relative", "rounding", "expected"),
+    [(1e-13, 0.0, 1e-13), (1e-13, 1e-9, 1e-13), (1e-9, 1e-8, PLAIN), (1e-8, 1e-9, 9e-9), (1e-8, 0.0, 1e-8)],
+)
+def test_rounding_of_heavy_bodies_is_not_put_down_to_the_torques(
+    relative: float, rounding: float, expected: float
+) -> None:
+    assert balance(relative, rounding).uncertainty == pytest.approx(expected, rel=1e-12)
+
+
+# claims: what a paper prints against what was measured
+
+ROWS = [
+    ("one", "x", "lumped", "q1", 0.03, 0.01),
+    ("one", "x", "lumped", "q2", 0.05, 0.02),
+    ("one", "x", "distributed", "q1", 0.5, 0.03),
+    ("one", "y", "lumped", "q1", 0.7, 0.04),
+    ("two", "x", "lumped", "q1", 0.9, 0.06),
+]
+"""case, candidate, reference, joint, peak error, rms error"""
+FACTS = {
+    "one": {"peak_speed": 2.5, "solutions_at_start": [[0.1, 0.2, 0.3], [0.1, -0.2, 0.3]]},
+    "two": {"peak_speed": None},
+}
+
+
+def judged(kind: str, claimed: float, within: float = 0.0, **measure: object) -> tuple[float | None, bool | None]:
+    claim = ClaimSpec(
+        id="c",
+        text="t",
+        source="s",
+        kind=kind,
+        claimed=claimed,
+        within=within,
+        unit="",
+        measure={"case": "one"} | measure,
+    )  # type: ignore[arg-type]
+    names = ("case", "candidate", "reference", "joint", "peak_error", "rms_error")
+    rows = [SimpleNamespace(**dict(zip(names, row, strict=True))) for row in ROWS]
+    campaign = Campaign.model_construct(claim=[claim])
+    (found,) = judge_claims(campaign, rows, FACTS)  # type: ignore[arg-type]
+    assert (found["id"], found["claimed"], found["kind"], found["within"]) == ("c", claimed, kind, within)
+    return found["measured"], found["holds"]
+
+
+@pytest.mark.parametrize(
+    ("measure", "measured"),
+    [
+        ({}, 0.7),
+        ({"candidate": "x"}, 0.5),
+        ({"candidate": "x", "reference": "lumped"}, 0.05),
+        ({"candidate": "x", "reference": "lumped", "joint": "q1"}, 0.03),
+        ({"reference": "distributed"}, 0.5),
+        ({"joint": "q2"}, 0.05),
+        ({"case": "two"}, 0.9),
+        ({"candidate": "z"}, None),
+        ({"case": "three"}, None),
+        ({"quantity": "rms_error", "candidate": "x"}, 0.03),
+        ({"quantity": "peak_speed"}, 2.5),
+        ({"quantity": "peak_speed", "case": "two"}, None),
+        ({"quantity": "peak_acceleration"}, None),
+        # the nearest solution, and of it the coordinate that is farthest off
+        ({"quantity": "solution_distance", "point": [0.1, -0.21, 0.35]}, 0.05),
+    ],
+)
+def test_what_a_claim_measures(measure: dict[str, object], measured: float | None) -> None:
+    found, holds = judged("upper", 1.0, **({"quantity": "peak_error"} | measure))
+    assert found == (None if measured is None else pytest.approx(measured, rel=1e-12))
+    assert (holds is None) == (measured is None)
+
+
+@pytest.mark.parametrize(
+    ("kind", "claimed", "within", "holds"),
+    [
+        ("upper", 0.71, 0.0, True),
+        ("upper", 0.7, 0.0, False),  # "less than" is less
+        ("upper", 0.69, 0.5, False),
+        ("value", 0.71, 0.02, True),
+        ("value", 0.69, 0.02, True),
+        ("value", 0.75, 0.02, False),
+        ("value", 0.65, 0.02, False),
+    ],
+)
+def test_whether_a_claim_holds(kind: str, claimed: float, within: float, holds: bool) -> None:
+    assert judged(kind, claimed, within, quantity="peak_error") == (0.7, holds)
