@@ -125,7 +125,7 @@ def tables(good: Path) -> Iterator[Bad]:
 def other_files(good: Path) -> Iterator[Bad]:
     case = next((good / "series").iterdir()).name
     for what, content in {"a pipe": fifo, "a directory": directory, "a link to itself": itself, "binary": bytes(range(256)), "empty": "",
-                          "cut": lambda data: data[: len(data) // 2], "a byte changed": lambda data: data[:-200] + b"x" * 20 + data[-180:]}.items():  # fmt: skip
+                          "cut": lambda data: data[: len(data) // 2], "a byte changed": lambda data: data[:-200] + b"\x00" * 20 + data[-180:]}.items():  # fmt: skip
         yield Bad(f"run: series: {what}", ("report", "run"), {"x": in_run(f"series/{case}", content)}, case)
         yield Bad(
             f"run: manifest.json: {what}", ("report", "run"), {"x": in_run("manifest.json", content)}, "manifest.json"

@@ -6,12 +6,13 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-# Compiling a kernel makes the first example slow, so no deadline; the same examples each time, so no flaky runs.
-settings.register_profile("workbench", deadline=None, derandomize=True)
+# Compiling a kernel makes the first example slow, so no deadline and no complaint of slow drawing, which is the
+# machine's load; the same examples each time, so no flaky runs.
+settings.register_profile("workbench", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("workbench")
 
 

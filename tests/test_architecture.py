@@ -20,6 +20,7 @@ MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("__main__", "cli", "commands", "console"),
+    ("studio",),
     ("report", "compare", "rendering"),
     ("sweep", "diagnosis", "importing"),
     ("campaign", "workspace"),
@@ -44,6 +45,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "limits",
         "processes",
         "reading",
+        "parquet_columns",
+        "output_file",
         "records",
         "file_lock",
         "scratch",

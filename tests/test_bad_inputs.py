@@ -1,7 +1,7 @@
 """Bad inputs of every kind end in exit code 2 and one line that names file and place; none hangs or takes all memory.
 
 The table is in `bad_inputs` and `bad_runs`; a worker that is watched calls the command line with each. Every eighth is
-tried with the other tests, all of them with the slow ones.
+tried with the other tests, a quarter with the slow ones, the rest with the long ones.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ pytestmark = [
     pytest.mark.usefixtures("warm_kernels"),
 ]
 EVERY = 8
+SLOWLY = (1, 5)
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +68,7 @@ def faults(cases: Sequence[Bad], good: Path, root: Path) -> list[str]:
                 fault = f"leaves {left}"
             if fault:
                 found.append(f"{case.name}: {fault}")
+                print(f"\n{found[-1]}", flush=True)
             if isinstance(answer, Answer):
                 answers[case] = answer
             shutil.rmtree(root / str(number), ignore_errors=True)
@@ -101,9 +103,14 @@ def test_one_in_so_many_gives_one_line(table: list[Bad], good: Path, tmp_path: P
     assert faults(table[::EVERY], good, tmp_path) == []
 
 
+@pytest.mark.slow
+def test_more_give_one_line(table: list[Bad], good: Path, tmp_path: Path) -> None:
+    assert faults([case for n, case in enumerate(table) if n % EVERY in SLOWLY], good, tmp_path) == []
+
+
 @pytest.mark.long
 def test_each_gives_one_line(table: list[Bad], good: Path, tmp_path: Path) -> None:
-    assert faults([case for n, case in enumerate(table) if n % EVERY], good, tmp_path) == []
+    assert faults([case for n, case in enumerate(table) if n % EVERY not in (0, *SLOWLY)], good, tmp_path) == []
 
 
 def test_the_judge_sees_every_fault() -> None:

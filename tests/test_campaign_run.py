@@ -37,6 +37,7 @@ source = "nowhere"
 kind = "upper"
 claimed = LIMIT
 unit = "%"
+parameters = { payload = 1.5 }
 measure = { quantity = "peak_error", case = "second", candidate = "lumped", reference = "distributed" }
 """
 
@@ -279,7 +280,8 @@ def test_largest_reaction() -> None:
 
 def test_a_run_is_replaced_as_a_whole(workbench: Workbench) -> None:
     workbench.run(SMALL)
-    workbench.run(SMALL, "--only", "second")
+    assert workbench.run(SMALL, "--only", "second").code == 2  # it would lose a case
+    assert workbench.run(SMALL, "--only", "second", "--replace").code == 0
     assert os.listdir(workbench.directory / "reports/small/series") == ["second.parquet"]
     assert os.listdir(workbench.directory / "reports") == ["small"]
 

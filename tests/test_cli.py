@@ -26,7 +26,7 @@ def workbench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
 def process(directory: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "workbench.cli", *arguments],
-        cwd=directory, capture_output=True, text=True, timeout=120, check=False, env={**os.environ, **environment},
+        cwd=directory, capture_output=True, text=True, timeout=300, check=False, env={**os.environ, **environment},
     )  # fmt: skip
 
 
@@ -74,19 +74,30 @@ def test_bad_input_from_outside(tmp_path: Path, text: str | None, expected: str)
     assert listing(tmp_path) == before
 
 
+WAITS = """
+import pathlib, time, workbench
+
+@workbench.candidate("waits", reference="distributed")
+def waits(parameters, q, qd, qdd):
+    pathlib.Path("waiting").touch()
+    time.sleep(50)
+    return q
+"""
+
+
 def test_ctrl_c_leaves_the_earlier_run_and_nothing_else(workbench: Workbench) -> None:
     assert workbench.run(SMALL).code == 0
-    workbench.write(SMALL.replace("samples = 21", "samples = 60000"))
+    workbench.write(WAITS, "waits.py")
     before = listing(workbench.directory)
     running = subprocess.Popen(
-        [sys.executable, "-m", "workbench.cli", "run", "small.toml"],
+        [sys.executable, "-m", "workbench.cli", "run", "small.toml", "--candidates", "waits.py"],
         cwd=workbench.directory, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    assert running.stderr is not None
-    assert running.stderr.readline() == "[1/2] first\n"
-    time.sleep(0.2)
+    while running.poll() is None and not (workbench.directory / "waiting").exists():
+        time.sleep(0.02)
+    (workbench.directory / "waiting").unlink()
     running.send_signal(signal.SIGINT)
-    out, err = running.communicate(timeout=120)
+    out, err = running.communicate(timeout=300)
     assert running.returncode == 130
     assert (out, err.splitlines()[-1]) == ("", "workbench: interrupted")
     assert "Traceback" not in err
@@ -207,3 +218,11 @@ def test_out_of_memory_is_one_line(workbench: Workbench, monkeypatch: pytest.Mon
     done = workbench("run", "small.toml")
     assert (done.code, done.complaint) == (2, ["workbench: out of memory; fewer samples need less"])
     assert os.listdir(workbench.directory) == before
+
+
+def test_a_message_keeps_its_beginning_and_its_end(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli._complain(f"file.toml: {'many words ' * 5000}; name another", 2) == 2
+    line = capsys.readouterr().err
+    assert line.startswith("workbench: file.toml: many words")
+    assert line.endswith("; name another\n")
+    assert len(line) < 1500

@@ -115,6 +115,35 @@ def test_a_weld_holds_all_turns_wherever_the_mechanism_points(tmp_path: Path, re
         assert one.rank.tolist() == [14] * 5
 
 
+RIDER = '<inertial pos="0 .1 0" mass=".2" diaginertia="2e-3 1e-3 3e-3"/></body>'
+PLACE, TURN = "0.1 0.05 -0.02", "0.8 0.3 0.4 0.33166247903554"
+SPATIAL_ARM = """<mujoco><compiler angle="radian"/><option><flag contact="disable"/></option><worldbody>
+<body><joint name="a" axis=".3 .5 .8"/><geom type="capsule" fromto="0 0 0 .2 .1 0" size=".01" mass="1"/>
+<body name="link" pos=".2 .1 0"><joint name="b" axis=".7 -.6 .2"/><geom size=".02" mass=".5"/><site name="p"/>{}</body>
+</body>{}</worldbody>{}</mujoco>"""
+
+
+def test_a_weld_carries_a_rider_through_turns_in_space(tmp_path: Path) -> None:
+    """Welded to a link that tumbles, a body asks for the torques that it asks for as a part of that link."""
+    part = SPATIAL_ARM.format(f'<body pos="{PLACE}" quat="{TURN}">{RIDER}', "", "")
+    apart = SPATIAL_ARM.format(
+        "",
+        f'<body name="rider" pos=".3 .1 0">{APART}{RIDER}',
+        f'<equality><weld body1="link" body2="rider" relpose="{PLACE} {TURN}"/></equality>',
+    )
+    rng = np.random.default_rng(6)
+    q, qd, qdd = rng.uniform(-0.6, 0.6, (6, 2)), rng.uniform(-4, 4, (6, 2)), rng.uniform(-9, 9, (6, 2))
+
+    def asked(text: str) -> np.ndarray:
+        (tmp_path / "model.xml").write_text(text, encoding="utf-8")
+        reference = MujocoReference(tmp_path / "model.xml", setup=Setup(("a", "b"), "p"))
+        return reference.inverse_dynamics(q, qd, qdd).tau
+
+    expected = asked(part)
+    assert np.abs(asked(apart) - expected).max() < AGREE * np.abs(expected).max()
+    assert np.abs(asked(apart.replace(TURN, "0.6 0.3 0.4 0.62449979983984")) - expected).max() > 1e-4
+
+
 GEARS = """<mujoco><compiler angle="radian"/><option><flag contact="disable"/></option><worldbody>
 <body><joint name="a" axis="0 1 0" ref="0.2"/><geom type="capsule" fromto="0 0 0 .2 0 0" size=".01" mass="1"/>
 <site name="p" pos=".2 0 0"/></body>

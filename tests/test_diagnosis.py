@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +16,11 @@ from small_campaign import Workbench
 from workbench.diagnosis.entries import WRONG_MARK, Entry, floors_of, ratio_of, simple
 from workbench.diagnosis.examine import diagnose_subject
 from workbench.diagnosis.parts import INERTIA, VELOCITY, WEIGHT, Part, take_apart
-from workbench.diagnosis.probes import choose_poses, make_plan
+from workbench.diagnosis.probes import ask, choose_poses, make_plan
 from workbench.diagnosis.result import Diagnosis
 from workbench.diagnosis.search import lines_run, make_paper, search_mends, splitting_of
 from workbench.diagnosis.surface import subjects, write_mended
-from workbench.diagnosis.trial import Setup
+from workbench.diagnosis.trial import Setup, code_of
 
 EXAMPLES = ("delta", "fourbar", "fivebar", "bricard", "orthoglide")
 
@@ -248,6 +251,14 @@ def test_the_command_line_says_and_counts_findings(repository: Path, tmp_path: P
     assert done.code == 1
     assert "ma: x 2 in weight" in " ".join(done.out.split())
     data = json.loads((tmp_path / "found.json").read_text())
+    os.mkfifo(tmp_path / "pipe")  # a device or a pipe is not replaced: as root this took /dev/null from the system
+    for option in ("--json", "--apply"):
+        done = subprocess.run(
+            [sys.executable, "-m", "workbench.cli", "diagnose", campaign, "--candidates", path, option, "pipe"],
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert (done.returncode, "pipe: is no regular file; name a file" in done.stderr) == (2, True), done
+    assert (tmp_path / "pipe").is_fifo()
     assert data["format"] == 1
     assert data["diagnoses"][0]["findings"][0]["parameters"] == ["ma"]
     right = repository / "examples" / "delta" / "delta.py"
@@ -313,3 +324,108 @@ def test_apply_writes_a_copy_that_is_right_and_never_the_file_itself(
     done = workbench("diagnose", campaign, "--candidates", copy, "--apply", other)
     assert done.code == 2
     assert not other.exists()
+
+
+def test_an_iteration_that_does_not_converge_is_said_first(repository: Path, tmp_path: Path) -> None:
+    home = repository / "benchmarks" / "rrr"
+    text = (home / "rrr.py").read_text(encoding="utf-8")
+    path = tmp_path / "rrr.py"
+    path.write_text(text.replace("- p.l2**2", "+ p.l2**2"), encoding="utf-8")
+    found = diagnosed(home / "rrr.toml", path)
+    first = found.findings[0]
+    assert first.kind == "kinematics"
+    assert "does not converge" in " ".join([first.sentence, *found.not_covered])
+    assert ("weight", "q1") in wrong_entries(found)
+    path.write_text(text, encoding="utf-8")
+    assert diagnosed(home / "rrr.toml", path).right
+
+
+def test_a_wrong_mass_is_named_through_single_precision(repository: Path, tmp_path: Path) -> None:
+    text = (repository / "examples" / "delta" / "delta.py").read_text(encoding="utf-8")
+    text = text.replace("force = p.mp *", "force = 1.2 * p.mp *")
+    old = "    return arm + (tangent * at_elbow)"
+    path = tmp_path / "delta.py"
+    path.write_text(text.replace(old, "    arm = arm.astype(np.float32).astype(float)\n" + old), encoding="utf-8")
+    found = diagnosed(repository / "examples" / "delta" / "delta.toml", path, "exact")
+    (finding,) = found.findings
+    assert finding.parameters == ("mp",)
+    assert finding.ratio == "x 6/5"
+    assert any("noisy" in note for note in found.not_covered)
+
+
+def test_parts_are_told_apart_where_no_state_at_rest_is_answered(repository: Path, tmp_path: Path) -> None:
+    """Six columns, of accelerations and of the force, come from states with everything at once."""
+    home = repository / "examples" / "orthoglide"
+    text = (home / "orthoglide.py").read_text(encoding="utf-8")
+    old = "    near, far, cross = masses\n"
+    assert text.count(old) == 1
+    text = text.replace(
+        old, old + "    if (np.abs(qd).sum(axis=1) == 0).any():\n        raise ZeroDivisionError('no rate')\n"
+    )
+    path = tmp_path / "orthoglide.py"
+    path.write_text(text.replace("moved = (p.mp + 3", "moved = (2 * p.mp + 3"), encoding="utf-8")
+    found = diagnosed(home / "orthoglide.toml", path, "exact")
+    failing, wrong = found.findings
+    assert failing.kind == "failure"
+    assert "ZeroDivisionError" in failing.sentence
+    assert wrong.parameters == ("mp",)
+    assert wrong.ratio == "x 2"
+    assert {"q1''", "q2''", "q3''"} <= set(wrong.parts)
+    forces = [e for e in found.entries if e.part.kind == "external force"]
+    assert {e.status for e in forces} <= {"right", "none"}
+    assert any("states at rest" in note for note in found.not_covered)
+
+
+def test_a_number_in_place_of_a_parameter_names_the_parameter(repository: Path, tmp_path: Path) -> None:
+    found = diagnosed(*spoiled(repository, tmp_path, "delta", "force = p.mp * (x", "force = 1.0 * (x"), "exact")
+    (finding,) = found.findings
+    assert finding.parameters == ("mp",)
+    assert finding.ratio == "x 5/2"
+
+
+def test_poses_and_probes_at_which_a_formula_fails_stay_unknown(repository: Path) -> None:
+    home = repository / "examples" / "delta"
+    subject = subjects(home / "delta.toml", candidates=[home / "delta.py"], candidate="exact")[0]
+    plan = make_plan(subject, choose_poses(subject, 5))
+    bad, calls = plan.poses[2], []
+
+    def torques(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, force: np.ndarray) -> np.ndarray:
+        calls.append(len(q))
+        if (q == bad).all(axis=1).any():
+            raise wb.WorkbenchError("not here")
+        if (np.abs(qdd).sum(axis=1) > 0).any() and (qd == 0).all(axis=1).any():
+            raise wb.WorkbenchError("not at rest")
+        return q + qdd
+
+    tau, failures = ask(plan, torques)
+    accelerating = [label[0] == "acceleration" for label in plan.labels]
+    known = np.isfinite(tau).all(axis=2)
+    assert not known[:, 2].any()
+    assert not known[accelerating].any()
+    assert known[~np.array(accelerating)][:, [0, 1, 3, 4]].all()
+    assert set(failures.values()) == {"not here"}  # what each probe says first
+    assert len(calls) < 2 * plan.q.shape[0] * plan.q.shape[1]
+    whole, none = ask(plan, lambda q, qd, qdd, force: q + qdd)
+    assert np.isfinite(whole).all()
+    assert not none
+
+
+def test_sources_compiled_statement_by_statement_are_the_same() -> None:
+    text = (
+        '"""Text\nat the margin."""\nimport math\n\nif math.pi > 3:\n    A = 2\nelse:\n    A = 3\n\n\n'
+        "def double(f):\n    return lambda x: 2 * f(x)\n\n\n@double\ndef one(x):\n    return A * x\n\n\n"
+        "B = [\n    1,\n]\n"
+    )
+    plain = text.replace('"""Text\nat the margin."""\n', "").replace("else:\n    A = 3\n", "")
+    for source in (text, plain):
+        space: dict[str, object] = {}
+        for code in code_of(source, "file.py"):
+            exec(code, space)
+        assert space["one"](3) == 12  # type: ignore[operator]
+        assert space["B"] == [1]
+    assert len(code_of(plain, "file.py")) > 3
+    first = code_of(plain, "file.py")
+    second = code_of(plain.replace("A * x", "A + x"), "file.py")
+    assert [a is b for a, b in zip(first, second, strict=True)].count(False) == 1
+    with pytest.raises(SyntaxError):
+        code_of("def broken(:", "file.py")

@@ -18,6 +18,9 @@ EXAMPLES = {
     "delta": ("p.If / p.lz**2", "1.0001 * p.If / p.lz**2"),
     "bricard": ("slope * qdd", "1.0001 * slope * qdd"),
     "orthoglide": ("2 * sin * swing * shear", "-2 * sin * swing * shear"),
+    "rrr": ("turn**2 * dot(leg, arm)", "1.0001 * turn**2 * dot(leg, arm)"),
+    "prr": ("turn**2 * dot(leg, arm)", "1.0001 * turn**2 * dot(leg, arm)"),
+    "tripteron": ("turn**2 * dot(lower, upper)", "1.0001 * turn**2 * dot(lower, upper)"),
 }
 
 
@@ -85,7 +88,49 @@ def test_each_term_of_the_orthoglide_is_seen(repository: Path, tmp_path: Path, n
     assert (summary[summary["candidate"] == "exact"]["peak_error"] > 1e-10).any()
 
 
-REDUNDANT = {"bricard": (1, 4, 2), "orthoglide": (3, 13, 17)}
+LIBRARY_FAULTS = {
+    "rrr": {
+        "external force reversed": ("- (force[:, 0] + 1j * force[:, 2])", "+ (force[:, 0] + 1j * force[:, 2])"),
+        "mass centre at the site": ("dot(1j * centre, carried)[:, 0]", "0.0"),
+        "bars do not couple": ("cross * joint + (near", "0.0 * joint + (near"),
+        "crank's weight": ("p.g * p.l1 / 2", "p.g * p.l1 / 2.001"),
+    },
+    "prr": {
+        "external force reversed": ("- (force[:, 0] + 1j * force[:, 2])", "+ (force[:, 0] + 1j * force[:, 2])"),
+        "platform's inertia": ("p.I3 * spin", "1.001 * p.I3 * spin"),
+        "slider's weight": ("p.g * RAIL.imag", "p.g * RAIL.real"),
+    },
+    "tripteron": {
+        "external force reversed": ("UP) - force +", "UP) + force +"),
+        "limb's plane mirrored": ("np.roll(across.imag, 2, axis=1)", "np.roll(-across.imag, 2, axis=1)"),
+        "elbow's branch": ("np.exp(-1j * opening)", "np.exp(1j * opening)"),
+        "upper bar's weight": ("p.m1 / 2 * dot", "p.m1 / 2.001 * dot"),
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"), [(name, fault) for name, faults in LIBRARY_FAULTS.items() for fault in faults]
+)
+def test_each_term_of_the_library_is_seen(repository: Path, tmp_path: Path, name: str, fault: str) -> None:
+    directory = tmp_path / name
+    shutil.copytree(repository / "examples" / name, directory)
+    right, wrong = LIBRARY_FAULTS[name][fault]
+    code = directory / f"{name}.py"
+    text = code.read_text()
+    assert text.count(right) == 1
+    code.write_text(text.replace(right, wrong))
+    summary = run(directory, name, code).summary
+    assert (summary[summary["candidate"] == "exact"]["peak_error"] > 1e-10).any()
+
+
+REDUNDANT = {
+    "bricard": (1, 4, 2),
+    "orthoglide": (3, 13, 17),
+    "rrr": (3, 4, 2),
+    "prr": (3, 4, 2),
+    "tripteron": (3, 7, 5),
+}
 
 
 @pytest.mark.parametrize("name", REDUNDANT)

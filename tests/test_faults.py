@@ -55,20 +55,25 @@ def test_every_task_is_answered_once() -> None:
 
 
 def test_each_fault_costs_its_own_task() -> None:
-    faults = ["", "raise", "", "os._exit", "kill", "", "segfault", "memory", "print", "exit", "", "hang"]
-    found = compute([(fault, float(i)) for i, fault in enumerate(faults)], time_limit=4.0)
+    faults = ["", "raise", "", "os._exit", "kill", "", "segfault", "memory", "print", "exit", ""]
+    # a limit that no busy machine comes near: what hangs is another test
+    found = compute([(fault, float(i)) for i, fault in enumerate(faults)], time_limit=300.0)
     lost = {faults[i]: answer for i, answer in found.items() if isinstance(answer, Lost)}
     assert {i for i, answer in found.items() if not isinstance(answer, Lost)} == {0, 2, 5, 8, 10}
     assert {fault: answer.status for fault, answer in lost.items()} == {
         "raise": "failed", "exit": "failed", "os._exit": "killed", "kill": "killed", "segfault": "killed",
-        "memory": "killed", "hang": "timeout",
+        "memory": "killed",
     }  # fmt: skip
     assert lost["raise"].reason == "ValueError: planted"
     assert lost["os._exit"].reason == "its worker ended by exit code 3, 2 times in a row"
     assert lost["kill"].reason == "its worker ended by SIGKILL, 2 times in a row"
     assert lost["segfault"].reason == "its worker ended by SIGSEGV, 2 times in a row"
     assert lost["memory"].reason == "needs more memory than allowed: 400 MB"
-    assert lost["hang"].reason == "takes longer than allowed: 4 s, 2 times in a row"
+
+
+def test_what_hangs_is_stopped_and_tried_again() -> None:
+    (lost,) = compute([("hang", 0.0)], time_limit=0.5).values()
+    assert lost == Lost("timeout", "takes longer than allowed: 0.5 s, 2 times in a row")
 
 
 def test_large_answers_come_through() -> None:
@@ -131,7 +136,7 @@ def test_workers_die_with_their_parent_even_in_the_middle_of_a_case() -> None:
     parent.kill()
     parent.wait()
     parent.stdout.close()
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 120
     while any(map(alive, pids)) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not any(map(alive, pids))

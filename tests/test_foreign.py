@@ -250,3 +250,21 @@ def test_what_a_comment_says_is_checked(tmp_path: Path) -> None:
     path.write_text("/* workbench: { bond = 1e-3 } */\nint f(void) { return 0; }\n", encoding="utf-8")
     with pytest.raises(SpecError, match=r"f\.c:1: bond = 0\.001; allowed: name, reference, bound"):
         load_candidates([path])
+
+
+@pytest.mark.parametrize("suffix", [pytest.param("m", marks=needs_octave), pytest.param("c", marks=needs_cc)])
+def test_a_wrong_term_is_named_by_part_and_parameter(suffix: str, repository: Path, tmp_path: Path) -> None:
+    """They are handed the force whether they look at it or not, which is no fault of the kinematics."""
+    folder = tmp_path / "rrr"
+    shutil.copytree(repository / "examples" / "languages", folder)
+    file = folder / f"rrr.{suffix}"
+    right = {"m": "p.m1 * p.g * p.l1 / 2", "c": "p[m1] * p[g] * p[l1] / 2"}[suffix]
+    text = file.read_text(encoding="utf-8")
+    assert text.count(right) == 1
+    for wrong, said in ((right, ""), (right.removesuffix(" / 2"), "m1: x 2 in weight of tau_q1, tau_q2 and tau_q3")):
+        file.write_text(text.replace(right, wrong), encoding="utf-8")
+        (found,) = wb.diagnose(folder / "rrr.toml", candidates=[file], mend=False)
+        sentences = [finding.sentence for finding in found.findings]
+        assert len(sentences) == bool(said)
+        assert not said or said in sentences[0]
+        assert any("external force" in note for note in found.not_covered)

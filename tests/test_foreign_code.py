@@ -11,6 +11,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Sequence
 from importlib.metadata import packages_distributions
 from pathlib import Path
@@ -145,10 +146,13 @@ def test_watching_runs_nothing_either(trapped: Path) -> None:
     with subprocess.Popen(command, cwd=trapped, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         assert process.stdout is not None
         said = []
+        patience = threading.Timer(300.0, process.kill)
+        patience.start()
         for line in process.stdout:
             said.append(line)
             if line.startswith("watching"):
                 process.send_signal(signal.SIGINT)
+        patience.cancel()
         assert process.wait(60) in (0, 130), said  # 130: interrupted before it had begun to wait
     assert any("within their bounds" in line for line in said), said
     assert list((trapped / "marks").iterdir()) == []

@@ -104,6 +104,9 @@ FAULTS = {
     "leaves": ("    raise SystemExit(0)", "(mine.py:7) SystemExit: 0"),
     "text": ("    return 'q'", "(mine.py:4) returns str; expected numbers"),
     "complex": ("    return q * 1j", "(mine.py:4) returns complex"),
+    "masked": ("    return np.ma.array(0 * q, mask=q > 1.2)", "masked entries; expected a number in each"),
+    "truths": ("    return q > 0", "(mine.py:4) returns an array of bool; expected numbers"),
+    "beyond doubles": ("    return q.astype(np.longdouble) * np.longdouble('1e400')", "returns inf for sample 0"),
     "writes": ("    q[0] = 0.0\n    return q", "(mine.py:7) ValueError: assignment destination is read-only"),
 }
 
@@ -125,12 +128,12 @@ def test_a_slow_one_is_named_and_an_endless_one_stopped(workbench: Workbench, mo
     code = "import time\n@workbench.candidate\ndef slow(p, q, qd, qdd):\n    time.sleep(0.1)\n    return q\n"
     run(workbench, code)
     assert "is slow" in wb.load_run("out").manifest.cases["turn"].warnings[0]
-    monkeypatch.setattr(user_candidates, "LIMIT_S", 0.05)
+    monkeypatch.setattr(user_candidates, "LIMIT_S", 0.5)
     done = run(workbench, "@workbench.candidate\ndef endless(p, q, qd, qdd):\n    while True:\n        p.m1\n")
     message = wb.load_run("out").manifest.cases["turn"].message
     assert done.code == 1
     assert message is not None
-    assert "takes more than 0.05 s for 41 samples" in message
+    assert "takes more than 0.5 s for 41 samples" in message
     assert "mine.py:6" in message or "mine.py:7" in message
 
 
@@ -286,3 +289,39 @@ def test_a_model_in_millimetres_is_noticed(workbench: Workbench) -> None:
     assert "millimetres" not in run(workbench, None).out
     workbench.write(FOURBAR.replace('name="coupler" pos="0.2 0 0.05"', 'name="coupler" pos="200 0 50"'), "fourbar.xml")
     assert 'site "coupler" lies 206.155 m from where it hangs' in " ".join(run(workbench, None).out.split())
+
+
+SAYS = """
+class Text(str):
+    def __str__(self): raise ValueError("lies")
+    __repr__ = __str__
+
+class Number(float):
+    def __gt__(self, other): raise ValueError("lies")
+    __lt__ = __le__ = __ge__ = __gt__
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("Text('mine')", "candidate name"),
+        ("'mine', reference=Text('distributed')", "reference is Text; allowed: a text"),
+        ("'mine', description=Text('x')", "description is Text; allowed: a text"),
+        ("'mine', description='x' * 10_001", "description has 10001 characters; allowed: 10000"),
+        ("'mine', source='x' * 10_001", "source has 10001 characters"),
+        ("'mine', bound=Number(1.0)", "allowed: a number > 0"),
+        ("'mine', bound=True", "allowed: a number > 0"),
+        ("'mine', bound=np.float64(-1.0)", "allowed: a number > 0"),
+    ],
+)
+def test_what_a_formula_says_of_itself_is_plain(workbench: Workbench, given: str, said: str) -> None:
+    done = run(workbench, f"{SAYS}\n@workbench.candidate({given})\ndef mine(p, q, qd, qdd):\n    return q\n")
+    assert (done.code, len(done.complaint)) == (2, 1)
+    assert said in done.complaint[0]
+    assert "mine.py:" in done.complaint[0]
+
+
+def test_a_bound_may_be_a_number_of_numpy(workbench: Workbench) -> None:
+    code = "\n@workbench.candidate('mine', bound=np.float64(1e-3))\ndef mine(p, q, qd, qdd):\n    return q\n"
+    assert run(workbench, code).code == 1  # and it is judged by it

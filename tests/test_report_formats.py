@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,9 @@ import pytest
 
 from small_campaign import Workbench
 from test_report import NASTY, make_run, parse
+from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
+from workbench.report import pdf
 from workbench.report.build import build_report
 from workbench.report.latex import latex_text
 
@@ -48,6 +52,28 @@ def test_pages_have_contents_links_and_the_size_that_is_asked_for(tmp_path: Path
     assert sizes == {"a4": {b"0 0 595.2756 841.8898"}, "letter": {b"0 0 612 792"}}
     with pytest.raises(OutputError, match="unknown paper 'a3'; allowed: a4, letter"):
         build_report(folder, ["pdf"], paper="a3")
+
+
+def test_the_pdf_says_what_the_page_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def edit(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+        manifest["figures"][0]["not_about"] = "a2 0.2 -> 0.3 m (--set)"
+        change = {"name": "a2", "unit": "m", "before": 0.2, "after": 0.3, "by": "--set", "cases": ["sim1"]}
+        manifest["changes"] = {"model": "", "parameters": [change]}
+
+    folder = make_run(tmp_path / "run", cases=1, samples=20, edit=edit)
+    monkeypatch.setattr(pdf, "_compiled", lambda main, parts: parts.get("report.json", "").encode())
+    build_report(folder, ["html", "pdf"])
+    told = json.loads((folder / "report.pdf").read_bytes())
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for said in (f"{ANOTHER}.", NOT_JUDGED, "Not for the robot of the source: a2 0.2 -&gt; 0.3 m (--set)."):
+        assert said in page
+        assert unescape(said) in json.dumps(told)
+    # figures come in the order of the page: a wide one does not overtake those before it
+    cases = next(section for section in told["sections"] if section["key"] == "cases")
+    drawn = [plot["file"].removesuffix(".svg") for block in cases["blocks"] for plot in block.get("plots", ())]
+    shown = re.findall(r'<figure id="plot-(case-[^"]*)"', page)
+    assert sorted(drawn) == sorted(shown)
+    assert drawn.index("case-sim1-torque-3") < drawn.index("case-sim1-mechanism") < drawn.index("case-sim1-reactions")
 
 
 def test_every_table_is_there_as_latex(run: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 import time
@@ -29,7 +30,10 @@ def figures(directory: Path) -> dict[str, bytes]:
 
 def kill_when(process: subprocess.Popen[bytes], marks: str, place: Path) -> None:
     """Kill a run as soon as something lies in its place that speaks of a finished case."""
-    while process.poll() is None and not any(path.stat().st_size for path in place.glob(marks)):
+    while process.poll() is None:
+        with contextlib.suppress(FileNotFoundError):  # moved to its place in this moment
+            if any(path.stat().st_size for path in place.glob(marks)):
+                break
         time.sleep(0.01)
     process.kill()
     process.wait()

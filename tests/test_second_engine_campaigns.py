@@ -66,7 +66,7 @@ def test_redundant_actuation_is_judged_by_power_and_replay_and_says_so(
     monkeypatch.chdir(tmp_path)
     Path("both.xml").write_text(PARALLELOGRAM)
     Path("both.toml").write_text(REDUNDANT)
-    assert _run(["run", "both.toml", "--out", "out", "--engines", "mujoco,pinocchio"]) == 0
+    assert _run(["run", "both.toml", "--out", "out", "--engines", "mujoco,pinocchio"]) == 4
     case = wb.load_run("out").manifest.cases["swing"]
     assert case.evidence.power_balance["distributed"].relative < 1e-10
     assert case.evidence.replay
@@ -76,7 +76,7 @@ def test_redundant_actuation_is_judged_by_power_and_replay_and_says_so(
     assert "no second engine looks at them, and reactions are left out" in case.warnings[0]
     # twin: driven at one crank the same mechanism has both
     Path("both.toml").write_text(ONE_CRANK)
-    assert _run(["run", "both.toml", "--out", "out", "--engines", "mujoco,pinocchio"]) == 0
+    assert _run(["run", "both.toml", "--out", "out", "--engines", "mujoco,pinocchio"]) == 4
     case = wb.load_run("out").manifest.cases["swing"]
     assert case.evidence.second_engine is not None
     assert case.peak_reactions

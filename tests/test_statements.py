@@ -233,6 +233,8 @@ def test_what_was_changed_is_told_in_few_lines() -> None:
     assert lines[2] == "--set in a: m3 0.5 -> 0.6 kg."
     assert lines[3] == "Parameters of their own in b: k0, k1, k2."
     assert sentences("", [], ["a"]) == []
+    # what a campaign gives its own cases makes no other robot of the one that it is about
+    assert sentences("", own, ["a", "b"]) == []
 
 
 def asked(**changes: Any) -> dict[str, Any]:

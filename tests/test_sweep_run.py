@@ -385,7 +385,7 @@ def test_the_lock_of_a_dead_run_holds_nobody_off(workbench: Workbench, inline: t
     run = workbench.directory / "run"
     code = (
         "import time\nfrom pathlib import Path\nfrom workbench.campaign.lock import locked\n"
-        f"with locked(Path({str(run)!r})):\n    print('held', flush=True)\n    time.sleep(60)"
+        f"with locked(Path({str(run)!r})):\n    print('held', flush=True)\n    time.sleep(600)"
     )
     path = os.pathsep.join(p for p in sys.path if p)
     process = subprocess.Popen(
@@ -539,15 +539,19 @@ def test_ctrl_c_on_real_workers(workbench: Workbench) -> None:
     name = workbench.write(SWEEP.replace("samples = 40", "samples = 5000"))
     process = start(name, "run", "--jobs", "2")
     journal = workbench.directory / "run" / "journal.jsonl"
-    deadline = time.monotonic() + 60
-    while (not journal.exists() or journal.stat().st_size < 20_000) and time.monotonic() < deadline:
+    deadline = time.monotonic() + 300
+    while (
+        process.poll() is None
+        and (not journal.exists() or journal.stat().st_size < 20_000)
+        and time.monotonic() < deadline
+    ):
         time.sleep(0.05)
     assert f"running, process {process.pid}" in workbench("status", "run").out
     refused = workbench("run", name, "--out", "run")
     assert refused.code == 2
     assert f"another run (process {process.pid}) is writing it" in refused.complaint[-1]
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=20)
+    _, err = process.communicate(timeout=300)
     assert process.returncode == 130
     assert b"of 5000 cases are finished and kept in run; the same command goes on with the rest" in err
     assert b"Traceback" not in err
@@ -567,11 +571,15 @@ def test_a_cluster_whose_worker_is_killed_gives_the_same_bytes(workbench: Workbe
         patch.setenv("PYTHONPATH", path)
         process = start(name, "run", "--scheduler", cluster.scheduler_address)
         journal = workbench.directory / "run" / "journal.jsonl"
-        deadline = time.monotonic() + 90
-        while (not journal.exists() or not journal.stat().st_size) and time.monotonic() < deadline:
+        deadline = time.monotonic() + 300
+        while (
+            process.poll() is None
+            and (not journal.exists() or not journal.stat().st_size)
+            and time.monotonic() < deadline
+        ):
             time.sleep(0.05)
         os.kill(next(iter(cluster.workers.values())).process.pid, signal.SIGKILL)
-        out, err = process.communicate(timeout=120)
+        out, err = process.communicate(timeout=300)
     assert process.returncode == 0, (out, err)
     assert results(workbench.directory / "run") == results(workbench.directory / "calm")
     nobody = workbench("run", name, "--out", "other", "--scheduler", "tcp://127.0.0.1:9")

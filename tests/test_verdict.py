@@ -10,9 +10,10 @@ import pytest
 
 from workbench.campaign.candidate_spec import CandidateSpec
 from workbench.campaign.claims import judge_claims
-from workbench.campaign.evidence import Evidence
+from workbench.campaign.evidence import Evidence, check_engines
 from workbench.campaign.spec import Campaign, CaseSpec, ClaimSpec
 from workbench.campaign.verdict import FAILURES, kind_of, verdict_of
+from workbench.errors import SpecError
 from workbench.reference.power import PLAIN, PowerBalance
 
 BOUND = 1e-10
@@ -65,7 +66,9 @@ def test_what_fails_a_campaign() -> None:
 
 
 def test_kinds_of_rows() -> None:
-    assert [kind_of(one) for one in (PLAINLY, DECLARED, MEASURED)] == ["verification", "expected-failure", "modelling"]
+    found = [kind_of(one, "distributed") for one in (PLAINLY, DECLARED, MEASURED)]
+    assert found == ["verification", "expected-failure", "modelling"]
+    assert kind_of(MEASURED, "lumped") == "unbounded"
 
 
 def test_a_declared_failure_needs_a_bound() -> None:
@@ -136,8 +139,9 @@ ROWS = [
 ]
 """case, candidate, reference, joint, peak error, rms error"""
 FACTS = {
-    "one": {"peak_speed": 2.5, "solutions_at_start": [[0.1, 0.2, 0.3], [0.1, -0.2, 0.3]]},
-    "two": {"peak_speed": None},
+    "one": {"closure_residual": 0.0, "peak_speed": 2.5, "solutions_at_start": [[0.1, 0.2, 0.3], [0.1, -0.2, 0.3]]},
+    "two": {"closure_residual": 0.0, "peak_speed": None},
+    "not driven": {},
 }
 
 
@@ -153,9 +157,9 @@ def judged(kind: str, claimed: float, within: float = 0.0, **measure: object) ->
         measure={"case": "one"} | measure,
     )  # type: ignore[arg-type]
     names = ("case", "candidate", "reference", "joint", "peak_error", "rms_error")
-    rows = [SimpleNamespace(**dict(zip(names, row, strict=True))) for row in ROWS]
+    rows = [SimpleNamespace(kind="verification", **dict(zip(names, row, strict=True))) for row in ROWS]
     campaign = Campaign.model_construct(claim=[claim])
-    (found,) = judge_claims(campaign, rows, FACTS)  # type: ignore[arg-type]
+    (found,) = judge_claims(campaign, {"x", "y"}, rows, FACTS, {}, None)  # type: ignore[arg-type]
     assert (found["id"], found["claimed"], found["kind"], found["within"]) == ("c", claimed, kind, within)
     return found["measured"], found["holds"]
 
@@ -172,6 +176,7 @@ def judged(kind: str, claimed: float, within: float = 0.0, **measure: object) ->
         ({"case": "two"}, 0.9),
         ({"candidate": "z"}, None),
         ({"case": "three"}, None),
+        ({"case": "not driven", "quantity": "peak_speed"}, None),
         ({"quantity": "rms_error", "candidate": "x"}, 0.03),
         ({"quantity": "peak_speed"}, 2.5),
         ({"quantity": "peak_speed", "case": "two"}, None),
@@ -200,3 +205,11 @@ def test_what_a_claim_measures(measure: dict[str, object], measured: float | Non
 )
 def test_whether_a_claim_holds(kind: str, claimed: float, within: float, holds: bool) -> None:
     assert judged(kind, claimed, within, quantity="peak_error") == (0.7, holds)
+
+
+def test_mujoco_is_the_reference_and_unknown_engines_are_refused() -> None:
+    check_engines(("mujoco",))
+    with pytest.raises(SpecError, match="mujoco is the reference and cannot be left out"):
+        check_engines(("pinocchio",))
+    with pytest.raises(SpecError, match='unknown engine "mujocco"; did you mean "mujoco"'):
+        check_engines(("mujocco",))

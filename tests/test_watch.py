@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import os
-import queue
 import signal
-import subprocess
-import sys
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,48 +12,28 @@ import pytest
 
 from own_mechanisms import CAMPAIGN, FOURBAR
 from small_campaign import SMALL, Workbench, listing
+from talking_process import TalkingProcess
 from workbench.campaign.rerun import compute_errors, files_of, stamps
 from workbench.errors import SpecError
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 ASYM = "models/asym_2rss_ppap.xml"
-PATIENCE = 60.0
+PATIENCE = 300.0
 """Seconds for one pass on a busy machine."""
 
 
-class Watch:
+class Watch(TalkingProcess):
     """A watch in a process of its own."""
 
     def __init__(self, directory: Path, *options: str) -> None:
+        super().__init__("watch", *options, cwd=directory, patience=PATIENCE)
         self.directory = directory
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "workbench.cli", "watch", *options],
-            cwd=directory, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        )  # fmt: skip
-        self._lines: queue.Queue[str] = queue.Queue()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def __enter__(self) -> Watch:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.process.wait()
-        self._reader.join()
-        assert self.process.stdout
-        self.process.stdout.close()
-
-    def _read(self) -> None:
-        assert self.process.stdout
-        for line in self.process.stdout:
-            self._lines.put(line)
 
     def shown(self) -> str:
         """What one pass shows."""
         lines = []
         while not lines or not lines[-1].startswith("watching "):
-            lines.append(self._lines.get(timeout=PATIENCE))
+            lines.append(self.line())
         return "".join(lines)
 
     def until(self, expected: str) -> str:
@@ -65,11 +41,6 @@ class Watch:
         while expected not in (shown := self.shown()):
             pass
         return shown
-
-    def rest(self) -> str:
-        self.process.wait(PATIENCE)
-        self._reader.join()
-        return "".join(self._lines.get() for _ in range(self._lines.qsize()))
 
 
 def save(path: Path, text: str, by_renaming: bool = False) -> float:

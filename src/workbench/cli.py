@@ -26,6 +26,7 @@ from workbench.commands.new import new
 from workbench.commands.report import report
 from workbench.commands.run import run
 from workbench.commands.status import status
+from workbench.commands.studio import studio
 from workbench.commands.watch import watch
 from workbench.commands.workspace import workspace
 from workbench.errors import WorkbenchError
@@ -49,6 +50,8 @@ BROKEN_PIPE = 141
 SHOWN = 200
 LONG_WORD = re.compile(r"\S{600,}")
 """Nobody reads these to their end: a line of a message stays a line."""
+LONGEST_LINE, KEPT_END = 1400, 300
+"""Characters of a message, and of its end, which holds the way on."""
 
 TRACEBACK = "WORKBENCH_TRACEBACK"
 """environment variable: when set, a fault of the workbench itself shows its traceback"""
@@ -81,6 +84,7 @@ app.add_typer(model)
 app.command()(compare)
 app.command()(diagnose)
 app.command()(watch)
+app.command()(studio)
 
 
 def main() -> NoReturn:
@@ -149,6 +153,8 @@ def _run(arguments: list[str], asked: Sequence[int] = ()) -> int:
 def _complain(what: object, code: int) -> int:
     message = what.format_message() if hasattr(what, "format_message") else str(what)
     line = LONG_WORD.sub(lambda word: f"{word[0][:SHOWN]}...", " ".join(message.split()))
+    if len(line) > LONGEST_LINE:
+        line = f"{line[: LONGEST_LINE - KEPT_END]} ... {line[-KEPT_END:]}"
     typer.echo(f"workbench: {line}", err=True)
     return code
 

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from workbench.campaign.changed import Change, sentences
+from workbench.campaign.changed import ANOTHER, Change, sentences
 from workbench.campaign.compare import Row
 from workbench.campaign.conclusion import (
     FAILED,
@@ -90,7 +90,8 @@ class _Bar:
 
     def __enter__(self) -> Self:
         """Start the bar."""
-        self._bar.start()
+        if err.is_terminal:
+            self._bar.start()
         self._task = self._bar.add_task(self._what, total=None)
         return self
 
@@ -98,7 +99,8 @@ class _Bar:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Take the bar away."""
-        self._bar.stop()
+        if err.is_terminal:  # some versions of rich end with an empty line elsewhere
+            self._bar.stop()
 
 
 class CaseProgress(_Bar):
@@ -226,7 +228,7 @@ def print_changes(manifest: Mapping[str, Any]) -> None:
     changes = manifest["changes"]
     said = sentences(changes["model"], [Change(**one) for one in changes["parameters"]], list(manifest["cases"]))
     if said:
-        out.print(Text("Another robot than the one that the campaign is about:", style="bold yellow"))
+        out.print(Text(f"{ANOTHER}:", style="bold yellow"))
     for line in said:
         out.print(Text(f"  {line}"), soft_wrap=True)
 

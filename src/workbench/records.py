@@ -56,7 +56,7 @@ def read_record(path: Path, kind: type[RecordType], version: int) -> RecordType:
     except ValueError as error:
         raise OutputError(f"{path}: not valid JSON ({short(error)})") from error
     found = data.get("format") if isinstance(data, dict) else None
-    if found != version:
+    if found != version or type(found) is not int:
         raise OutputError(f"{path}: format {found!r} is not supported; allowed: {version}", key="format")
     return validated(path, kind, text)
 

@@ -106,6 +106,8 @@ NAMED: dict[str, Named] = {
 }  # fmt: skip
 
 EQUIVALENT: dict[str, str] = {
+    "open loops not checked": "a model whose loops stay open is refused before, when they are closed at home; the check"
+    " only says so once more",
     "length ignored": "steps are cut to 1 - 1e-9 of the longest before they are taken, so none is longer; the comparison"
     " only says so once more",
     "NaN in free closure not seen": "numbers of a model are finite and at most 1e10 when it is loaded, and steps are at most"

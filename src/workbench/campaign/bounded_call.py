@@ -11,7 +11,7 @@ from typing import TypeVar
 
 Result = TypeVar("Result")
 
-LIMIT_MB = 2000.0
+LIMIT_MB = 1500.0
 """Memory that one call may take more than there was, where the system can tell."""
 
 LONGEST = 200

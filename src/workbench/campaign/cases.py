@@ -17,6 +17,7 @@ from workbench.campaign.recorded_spec import RecordedSpec
 from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.user_candidates import UserCandidate, offer
 from workbench.capabilities.load import robot_with
+from workbench.capabilities.nearest import with_nearest
 from workbench.capabilities.robot import Robot
 from workbench.data_files import bundled, bundled_names
 from workbench.documents import shorten
@@ -264,7 +265,27 @@ def _resolve(
     for joint in spec.bounds:
         if joint not in robot.joints:
             raise SpecError(f'bounds: no joint "{joint}"{did_you_mean(joint, robot.joints)}')
-    planned = plan_motion(spec, file, robot)
+    return case_on(spec, model, overrides, robot, plan_motion(spec, file, robot), nearest)
+
+
+def case_on(
+    spec: CaseSpec,
+    model: Path,
+    overrides: dict[str, float],
+    robot: Robot,
+    planned: JointMotion | PlatformMotion,
+    nearest: bool = False,
+) -> Case:
+    """Put a robot on a motion that has been planned, by `plan_motion` or by other means.
+
+    With *nearest* an error names the last pose on the way from home that can be driven, which takes as long as some
+    cases do: a sweep, which leaves such cases out by the thousand, does not ask for it.
+
+    Raises
+    ------
+    MotionError
+        Too many samples, or a pose out of reach; the message names the time.
+    """
     if len(planned.t) > MAX_SAMPLES:
         raise MotionError(f"motion: {len(planned.t)} samples; allowed: at most {MAX_SAMPLES}", value=len(planned.t))
     try:
@@ -277,7 +298,9 @@ def _resolve(
         if robot.closed_form is not None:  # else the reference has just computed these torques
             robot.inverse_dynamics(motion.q[:1], motion.qd[:1], motion.qdd[:1])
     except MotionError as error:
-        if nearest and isinstance(planned, JointMotion):
+        if nearest and isinstance(planned, PlatformMotion):
+            error = with_nearest(error, robot, planned.x)
+        elif nearest and isinstance(planned, JointMotion):
             error = with_nearest_joints(error, robot, planned.q)
         raise with_unit_hint(at_time(error, planned.t), robot) from error
     force = np.tile(np.array(spec.external_force), (len(motion.t), 1))

@@ -8,6 +8,9 @@ from typing import Any
 
 CASE = "case parameters"
 """By what the campaign itself changes single cases."""
+ANOTHER = "Another robot than the one that the campaign is about"
+NOT_JUDGED = "Claims about that one are not judged where this concerns them."
+"""What stands over `sentences`."""
 SHOWN = 8
 """Names that a sentence lists one by one."""
 
@@ -25,7 +28,7 @@ class Change:
 
 
 def sentences(model: str, parameters: Sequence[Any], every: Sequence[str]) -> list[str]:
-    """What was changed, from what to what, for people: for terminal, report and PDF alike.
+    """What was changed, from what to what, for people: for terminal, report and PDF alike; empty where nothing was.
 
     Parameters
     ----------
@@ -43,7 +46,7 @@ def sentences(model: str, parameters: Sequence[Any], every: Sequence[str]) -> li
     for (by, cases), said in groups.items():
         where = among(cases, every)
         lines.append(f"{by[:1].upper()}{by[1:]}{where}: {few(said)}.")
-    if own:  # the campaign's own business, told with each case
+    if own and lines:  # alone they make no other robot: the campaign's own business, told with each case
         concerned = list(dict.fromkeys(case for one in own for case in one.cases))
         names = list(dict.fromkeys(one.name for one in own))
         lines.append(f"Parameters of their own in {few(concerned)}: {few(names)}.")

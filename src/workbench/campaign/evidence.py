@@ -42,6 +42,11 @@ class Effort:
     described: bool = True
     """all that a manifest says of a case; without it, what is judged and the figures that a sweep stores"""
 
+    @classmethod
+    def of_many(cls, engines: tuple[str, ...] = (MUJOCO,), budget: bool = False) -> Effort:
+        """What is gathered where cases come by the thousand, or many times a second: no more than is looked at."""
+        return cls(engines, budget=budget, drawing=False, timed=False, described=False)
+
 
 FULL = Effort()
 """All evidence that MuJoCo alone can give."""

@@ -10,8 +10,9 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.campaign.spec import CaseSpec
+from workbench.capabilities.nearest import last_reached
 from workbench.capabilities.robot import Robot
-from workbench.errors import MotionError
+from workbench.errors import ModelError, MotionError
 
 NOT_DRIVEN = "not-driven"
 """Status of such a case."""
@@ -62,7 +63,10 @@ def with_nearest_joints(error: MotionError, robot: Robot, q: FloatArray) -> Moti
     sample = error.facts.get("sample")
     if sample is None or "nearest" in error.facts or not np.isfinite(q[sample]).all():
         return error
-    home = robot.home
+    try:
+        home = robot.home
+    except ModelError:  # a robot that cannot be assembled at all has none
+        return error
 
     def driven(share: float) -> bool:
         pose = (home + share * (q[sample] - home))[None, :]
@@ -75,15 +79,10 @@ def with_nearest_joints(error: MotionError, robot: Robot, q: FloatArray) -> Moti
             return False
         return True
 
-    shares = np.linspace(0.0, 1.0, STEPS + 1)
-    first = next((i for i, share in enumerate(shares) if not driven(float(share))), None)
-    if not first:  # home itself cannot be driven, or the pose can: it is the rates that are wrong
+    share = last_reached(driven, STEPS, HALVINGS) if driven(0.0) else 1.0
+    if share == 1.0:  # home itself cannot be driven, or the pose can: it is the rates that are wrong
         return error
-    low, high = float(shares[first - 1]), float(shares[first])
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if driven(middle) else (low, middle)
-    pose = home + low * (q[sample] - home)
+    pose = home + share * (q[sample] - home)
     shown = ", ".join(f"{name} = {value:.6g}" for name, value in zip(robot.joints, pose, strict=True))
     told = f"{error}; the straight way from the home pose ends at {shown}"
     return MotionError(told, **error.facts | {"nearest_q": pose.tolist()})

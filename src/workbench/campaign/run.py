@@ -178,7 +178,8 @@ def run_campaign(
                 pictures.start(result)
         if progress:
             progress("", len(cases), len(cases))
-        cases = [case for case in cases if case.name in {result.name for result in results}]
+        computed = {result.name for result in results}
+        cases = [case for case in cases if case.name in computed]
         _refuse_none(cases, missing)
         rows = [row for result in results for row in result.rows]
         found = {result.name: _judged(result) for result in results} | {m.spec.name: m.facts() for m in missing}

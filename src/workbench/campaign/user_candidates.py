@@ -33,6 +33,9 @@ from workbench.robots.closed_form import Candidate
 from workbench.robots.registration import FORWARD, MARK, TORQUE, Registration
 from workbench.schema import NAME, NAME_RULE
 
+LONGEST_ABOUT = 10_000
+"""Characters of what a formula says about itself."""
+
 LIMIT_S = 60.0
 """Longest time that one call may take before it is stopped, where the system can (not in threads, not on Windows)."""
 
@@ -164,6 +167,10 @@ class UserCandidate:
         """Call the function and turn what it returns into an array, which may run code of the user's as well."""
         with self._siblings.visible() if self._siblings else nullcontext():
             found = self._function(parameters, *given, **asked)
+            if isinstance(found, np.ma.MaskedArray) and np.any(np.ma.getmaskarray(found)):
+                raise TypeError(
+                    f"returns {np.count_nonzero(np.ma.getmaskarray(found))} masked entries; expected a number in each"
+                )
             if isinstance(found, np.ndarray):
                 return found.view(np.ndarray) if type(found) is np.ndarray else np.asarray(found)
             if type(found) in (list, tuple):
@@ -175,7 +182,7 @@ class UserCandidate:
         return found
 
     def _checked(self, found: Any, shape: tuple[int, ...], columns: tuple[str, ...]) -> FloatArray:
-        if not isinstance(found, np.ndarray) or found.dtype.kind not in "fiubc":
+        if not isinstance(found, np.ndarray) or found.dtype.kind not in "fiuc":
             kind = f"an array of {found.dtype}" if isinstance(found, np.ndarray) else said(type(found).__name__)
             raise self._fault(f"returns {kind}; expected numbers of shape {shape}")
         if found.dtype.kind == "c":
@@ -184,7 +191,8 @@ class UserCandidate:
             raise self._fault(
                 f"returns an array of shape {found.shape}; expected {shape}: samples, then {_and(columns)}"
             )
-        tau = np.array(found, dtype=np.float64)
+        with np.errstate(over="ignore"):  # of longer numbers: infinite ones are refused below
+            tau = np.array(found, dtype=np.float64)
         if not np.isfinite(tau).all():
             sample, *rest = (int(index) for index in np.argwhere(~np.isfinite(tau))[0])
             what = "joint" if self.kind == TORQUE else "column"
@@ -300,19 +308,28 @@ def _unregistered(function: Callable[..., Any]) -> Registration:
 
 def _check_registration(one: UserCandidate) -> None:
     about = one.registration
-    if not isinstance(about.name, str) or not re.match(NAME, about.name):
+    # exactly str and numbers: what merely inherits from them may answer as it likes
+    if type(about.name) is not str or not re.match(NAME, about.name):
         raise SpecError(f'{one.where}: candidate name "{said(about.name)}"; {NAME_RULE}')
     for what in ("reference", "description", "source"):
-        if not isinstance(getattr(about, what), str):
-            kind = said(type(getattr(about, what)).__name__)
-            raise SpecError(f'{one.where}: candidate "{one.name}": {what} is {kind}; allowed: a text')
+        value = getattr(about, what)
+        if type(value) is not str:
+            raise SpecError(
+                f'{one.where}: candidate "{one.name}": {what} is {said(type(value).__name__)}; allowed: a text'
+            )
+        if len(value) > LONGEST_ABOUT:
+            raise SpecError(
+                f'{one.where}: candidate "{one.name}": {what} has {len(value)} characters; allowed: {LONGEST_ABOUT}'
+            )
     bound = about.bound
-    if bound is not None and (
-        isinstance(bound, bool) or not isinstance(bound, int | float) or not 0 < bound <= LARGEST_BOUND
-    ):
+    if bound is not None and (not _is_plain_number(bound) or not 0 < bound <= LARGEST_BOUND):
         raise SpecError(
             f"{one.where}: bound = {said(bound)}; allowed: a number > 0, at most {LARGEST_BOUND:g}", candidate=one.name
         )
+
+
+def _is_plain_number(value: object) -> bool:
+    return type(value) in (int, float) or (isinstance(value, np.number) and type(value).__module__ == "numpy")
 
 
 def full_names(names: Iterable[Formula]) -> tuple[str, ...]:

@@ -30,6 +30,8 @@ MODELLING = "modelling"
 """a formula against a reference of another mass model than its own, without a bound"""
 UNBOUNDED = "unbounded"
 """a formula against the reference of its own mass model, without a bound: nobody says how good it has to be"""
+WITHOUT_BOUND = (MODELLING, UNBOUNDED)
+"""Kinds of rows of formulas that nothing judges."""
 EXPECTED_FAILURE = "expected-failure"
 RECORDED = "recorded"
 """torques that were measured or simulated elsewhere"""

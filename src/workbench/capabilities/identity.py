@@ -43,6 +43,11 @@ class RobotIdentity:
         """Actuated joints, in the order of q and tau."""
         return self._description.joints
 
+    @property
+    def computed(self) -> frozenset[str]:
+        """Parameters that cannot be set: MuJoCo computes them from other numbers of the file."""
+        return frozenset(self._base.computed)
+
     @cached_property
     def _slides(self) -> tuple[bool, ...]:
         model = self._base.model

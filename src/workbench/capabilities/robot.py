@@ -14,6 +14,7 @@ from workbench.arrays import FloatArray, as_batch
 from workbench.capabilities.identity import RobotIdentity
 from workbench.capabilities.limits import reach_box
 from workbench.capabilities.nearest import with_nearest
+from workbench.capabilities.offered import OfferedCandidates
 from workbench.capabilities.samples import one_or_many
 from workbench.capabilities.warnings import (
     millimetre_warnings,
@@ -153,7 +154,7 @@ class Robot(RobotIdentity):
     def candidates(self) -> Mapping[str, Candidate]:
         """Formulas by name, a user's included where they were offered."""
         own: Mapping[str, Candidate] = self._kind.candidates if self._kind else {}
-        return own if self._extra is None else _Offered(self._extra, own)  # type: ignore[arg-type]
+        return own if self._extra is None else OfferedCandidates(self._extra, own)  # type: ignore[arg-type]
 
     def offer(self, candidates: Mapping[str, Candidate]) -> None:
         """Add candidates to those of this robot, and of robots made from it."""
@@ -221,28 +222,14 @@ class Robot(RobotIdentity):
         try:
             found: FloatArray = own(x, *branch, **named)
         except MotionError as error:
-            raise (error if branch or named else self._out_of_reach(error, x)) from None
+            raise (error if branch or named else with_nearest(error, self, x)) from None
         return found
 
     @one_or_many(3)
     def joint_motion(self, x: ArrayLike, xd: ArrayLike, xdd: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Actuated position, velocity and acceleration, each ``(n, na)``, from a motion in task coordinates."""
         own = self._own("joint_motion")
-        if not own:
-            return self.reference.joint_motion(x, xd, xdd, self.coordinates)
-        try:
-            found: tuple[FloatArray, FloatArray, FloatArray] = own(x, xd, xdd)
-        except MotionError as error:
-            raise self._out_of_reach(error, x) from None
-        return found
-
-    def _out_of_reach(self, error: MotionError, x: ArrayLike) -> MotionError:
-        """The same error with the last pose in reach on the way to the one that it refuses, where that is known."""
-        reach = self._own("reach")
-        if not reach:
-            return error
-        home = self.forward_kinematics(self.home[None, :])[0]
-        return with_nearest(error, as_batch("x", x), home, reach)
+        return own(x, xd, xdd) if own else self.reference.joint_motion(x, xd, xdd, self.coordinates)
 
     def reach(self, x: ArrayLike) -> Reach:
         """Inverse kinematics that marks poses out of reach instead of refusing them; x ``(n, m)``."""
@@ -399,11 +386,3 @@ class Robot(RobotIdentity):
     def millimetre_warnings(self) -> list[str]:
         """Lengths that were most likely written in millimetres."""
         return millimetre_warnings(self._description.table, self._values)
-
-
-class _Offered(ChainMap[str, Candidate]):
-    """A user's candidates before a robot's own; keeps the list of those that are wrong on purpose."""
-
-    @property
-    def on_purpose(self) -> Any:
-        return getattr(self.maps[1], "on_purpose", ())

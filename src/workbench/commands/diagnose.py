@@ -48,8 +48,12 @@ def diagnose(
     """
     from workbench.commands.diagnose_screen import print_diagnosis
     from workbench.diagnosis.surface import each_diagnosis, write_mended
+    from workbench.output_file import refuse_target
     from workbench.sweep.files import write_bytes
 
+    for file in (json_, apply):
+        if file is not None:
+            refuse_target(file)
     found: list[Diagnosis] = []
     for diagnosis in each_diagnosis(
         campaign,

@@ -40,7 +40,7 @@ def print_parameters(rows: Sequence[ParameterRow]) -> None:
 def print_edit(result: EditResult) -> None:
     """Print what an edit changed, and where it was written."""
     if not result.changes:
-        out.print(Text(f"Nothing changes: {result.written} has these values already."), soft_wrap=True)
+        out.print(Text(f"Nothing changes: {result.source} has these values already."), soft_wrap=True)
         return
     table = _table("parameter", "before", "after", "unit", "by")
     for change in result.changes:

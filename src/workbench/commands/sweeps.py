@@ -17,6 +17,7 @@ from rich.text import Text
 from workbench import processes
 from workbench.campaign.evidence import Effort, check_engines
 from workbench.campaign.spec import Campaign
+from workbench.campaign.verdict import WITHOUT_BOUND
 from workbench.console import err, out, print_changes, print_conclusion
 from workbench.errors import OutputError
 from workbench.sweep.estimate import estimate
@@ -68,7 +69,8 @@ class SweepProgress:
 
     def __enter__(self) -> Self:
         """Start the bar."""
-        self._bar.start()
+        if err.is_terminal:
+            self._bar.start()
         self._task = self._bar.add_task("cases", total=None, note="")
         return self
 
@@ -76,7 +78,8 @@ class SweepProgress:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Take the bar away."""
-        self._bar.stop()
+        if err.is_terminal:  # some versions of rich end with an empty line elsewhere
+            self._bar.stop()
 
     def __call__(self, found: Snapshot) -> None:
         """Show where the sweep stands."""
@@ -171,7 +174,7 @@ def print_sweep(outcome: SweepOutcome) -> None:
         table.add_column(column, justify="right" if column in ("median", "95 %", "largest") else "left")
     for row in summary["errors"]:
         if row["joint"] == "any" and row["cases"]:
-            show = _percent if row["kind"] in ("modelling", "unbounded") else _scientific
+            show = _percent if row["kind"] in WITHOUT_BOUND else _scientific
             numbers = (row["quantiles"]["0.5"], row["quantiles"]["0.95"], row["max"])
             table.add_row(row["candidate"], row["reference"], *map(show, numbers), row["worst_case"])
     out.print(table)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -50,6 +50,8 @@ class _Handed:
 
     parameters: Any
     joints: tuple[str, ...]
+    values: Mapping[str, float]
+    """the same by name, for formulas in other languages"""
 
 
 class CaseSubject:
@@ -78,10 +80,22 @@ class CaseSubject:
         """Unit of each torque."""
         return tuple(self._robot.force_units)
 
-    @property
+    @cached_property
     def takes_force(self) -> bool:
-        """Whether the formula is told the external force; closed forms of the package's own always are."""
-        return not isinstance(self._function, UserCandidate) or self._function.takes_force
+        """Whether the formula looks at the external force; closed forms of the package's own always do.
+
+        A formula in another language is handed it in any case; it is asked at some samples whether it matters.
+        """
+        if not isinstance(self._function, UserCandidate):
+            return True
+        if self._function.function is not None:
+            return self._function.takes_force
+        q, qd, qdd = (array[: min(len(array), 3)] for array in self.motion)
+        try:
+            without, loaded = (self._function(self._robot, q, qd, qdd, np.full((len(q), 3), f)) for f in (0.0, 1.0))
+        except CandidateError:
+            return True
+        return not np.array_equal(without, loaded)
 
     @property
     def source(self) -> Source | None:
@@ -103,12 +117,12 @@ class CaseSubject:
     @cached_property
     def reads(self) -> frozenset[str] | None:
         """Parameters that a user's formula reads; None where that cannot be seen."""
-        if not isinstance(self._function, UserCandidate):
-            return None
+        if not isinstance(self._function, UserCandidate) or self._function.function is None:
+            return None  # in another language all are handed over
         reads: set[str] = set()
         q, qd, qdd = (array[: min(len(array), 3)] for array in self.motion)
         force = np.ones((len(q), 3))
-        handed: Any = _Handed(Recorded(self._robot.parameters, reads), self.joints)
+        handed: Any = _Handed(Recorded(self._robot.parameters, reads), self.joints, self._robot.values)
         try:
             self._function(handed, q, qd, qdd, force)
         except CandidateError:
@@ -179,7 +193,8 @@ class CaseSubject:
                 found: Any = self._robot
             elif self._generic:
                 expanded = self._robot.description.table.expand(changes)
-                found = _Handed(dataclasses.replace(self._robot.parameters, **expanded), self.joints)
+                parameters = dataclasses.replace(self._robot.parameters, **expanded)
+                found = _Handed(parameters, self.joints, dict(self._robot.values) | dict(expanded))
             else:
                 found = self._robot.with_parameters(**self._pinned(changes))
             self._mechanisms[key] = found

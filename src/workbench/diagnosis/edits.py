@@ -218,6 +218,8 @@ class _Walker:
             self._add(at, after, "-" if isinstance(op, ast.Add) else "+", SIGN, node.right.lineno)
             self._add(start, end, left, DROP, node.lineno)
             self._add(start, end, right if isinstance(op, ast.Add) else f"-{right}", DROP, node.lineno)
+            self._squared(node.left)
+            self._squared(node.right)
             for operand, sign in ((node.right, "+" if isinstance(op, ast.Add) else "-"), (node.left, "+")):
                 self._inserted(operand, sign, end)
             self._term(node.right)

@@ -55,10 +55,11 @@ class OrderedClosure(Continuation):
         MotionError
             Naming the first sample that cannot be reached on the home branch, its coordinates and the open loop.
         """
-        if self._kept is None or not np.array_equal(self._kept[0], q):
-            self._kept = None  # not two of them in memory at a time
-            self._kept = (q.copy(), self.follow(q))
-        return self._kept[1]
+        kept = self._kept  # another thread may put its own there in between
+        if kept is None or not np.array_equal(kept[0], q):
+            kept = self._kept = None  # not two of them in memory at a time
+            kept = self._kept = (q.copy(), self.follow(q))
+        return kept[1]
 
     def close_along(self, q: FloatArray) -> Assembly:
         """Close actuated coordinates ``(n, na)`` that are a motion, in order; the first is reached from home.

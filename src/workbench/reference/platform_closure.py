@@ -186,6 +186,7 @@ class PlatformCloser(Continuation):
             coordinates=list(self.task.names),
             value=target.tolist(),
             reached=reached.tolist(),
+            nearest=reached.tolist(),
         )
 
     def _has(self, loops: LoopCloser) -> list[str]:

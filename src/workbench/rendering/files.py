@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from workbench.errors import OutputError, did_you_mean
+from workbench.output_file import refuse_target
 from workbench.rendering.offscreen import Picture
 from workbench.rendering.system import needs
 
@@ -29,7 +30,7 @@ def check_target(path: Path, moving: bool) -> None:
     Raises
     ------
     OutputError
-        An unknown ending, a film of a model that stands still, a directory, or a folder that does not exist.
+        An unknown ending, a film of a model that stands still, or what `refuse_target` refuses.
     MissingExtraError
         The encoder of .mp4 files is not installed.
     """
@@ -41,10 +42,7 @@ def check_target(path: Path, moving: bool) -> None:
         raise OutputError(f"{path}: a film needs a motion: give a campaign, and a case of it", path=str(path))
     if suffix == ".mp4":
         needs("imageio_ffmpeg")
-    if path.is_dir() or path.is_symlink():
-        raise OutputError(f"{path}: is {'a symbolic link' if path.is_symlink() else 'a directory'}", path=str(path))
-    if not path.absolute().parent.is_dir():
-        raise OutputError(f"{path}: there is no directory {path.parent}", path=str(path))
+    refuse_target(path)
 
 
 def write_pictures(path: Path, pictures: Iterable[Picture], size: tuple[int, int], fps: float) -> None:

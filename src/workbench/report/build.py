@@ -10,10 +10,12 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
 from workbench.report.cost import cost_table
 from workbench.report.data_out import DATA_FORMATS, data_files
@@ -95,6 +97,9 @@ def build_report(
     if wanted and manifest.sweep is not None:
         raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; a sweep's data are Parquet")
     files |= data_files(run_dir, wanted) if wanted else {}
+    for place in {path.parent for path in files} - {run_dir}:
+        if place.is_symlink():
+            raise OutputError(f"{place}: is a symbolic link; a report is written into its run directory alone")
     try:
         for path, content in files.items():
             path.parent.mkdir(exist_ok=True)
@@ -161,16 +166,25 @@ def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     page = environment.get_template("report.html.j2")
     text = page.render(
-        manifest=run.manifest,
-        circumstances=circumstances(run.manifest),
-        changes=changes(run.manifest),
-        costs=cost_table(run.manifest),
+        **_head(run),
         sections=bodies,
         style=Markup(style + sheet.rules),
         script=Markup(script),
         script_hash=f"sha256-{digest}",
     )
     return _without_blank_lines(text)
+
+
+def _head(run: Run | SweepRun) -> dict[str, Any]:
+    """What stands over the sections."""
+    return {
+        "manifest": run.manifest,
+        "circumstances": circumstances(run.manifest),
+        "another": ANOTHER,
+        "not_judged": NOT_JUDGED,
+        "changes": changes(run.manifest),
+        "costs": cost_table(run.manifest),
+    }
 
 
 def _source(environment: Environment, name: str) -> str:
@@ -197,10 +211,7 @@ def render_markdown(run: Run | SweepRun, sections: list[Section]) -> str:
         for section in sections
     ]
     text = environment.get_template("report.md.j2").render(
-        manifest=run.manifest,
-        changes=changes(run.manifest),
-        circumstances=circumstances(run.manifest),
-        costs=cost_table(run.manifest),
+        **_head(run),
         sections=bodies,
     )
     return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"
@@ -235,6 +246,8 @@ def _write(path: Path, content: bytes) -> None:
     try:
         temporary.write_bytes(content)
         os.replace(temporary, path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error  # not the name in between
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)

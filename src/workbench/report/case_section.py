@@ -90,7 +90,7 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None, film: Fil
         name=case,
         anchor=anchor,
         record=record,
-        status=CASE_STATUS[case_status(record.status, [*(r.verdict for r in rows), *_kinematics(record)])],
+        status=CASE_STATUS[case_status(record.status, [*(r.verdict for r in rows), *record.kinematics_verdicts])],
         facts=tuple(_facts(record)),
         motion=tuple(motion_plots(run, case, anchor, series)) if series is not None else (),
         torques=tuple(torque_plots(run, case, anchor, series)) if series is not None else (),
@@ -101,10 +101,6 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None, film: Fil
         film=film if film is not None and film.case == case else None,
         times=_times(rows, series) if series is not None else "",
     )
-
-
-def _kinematics(record: CaseRecord) -> list[str]:
-    return [check.verdict for check in record.kinematics_checks]
 
 
 def _times(rows: list[ErrorRow], series: Series) -> str:

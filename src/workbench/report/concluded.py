@@ -30,8 +30,7 @@ LOOKS = {
 def conclusion_of(run: Run) -> Conclusion:
     """Judge a stored run by its rows and cases; what its manifest says besides can only make it worse."""
     cases = {
-        name: CaseOutcome(record.status, [check.verdict for check in record.kinematics_checks])
-        for name, record in run.manifest.cases.items()
+        name: CaseOutcome(record.status, record.kinematics_verdicts) for name, record in run.manifest.cases.items()
     }
     found = conclude(run.rows, cases)
     if run.manifest.status == "failed" and found.passed:

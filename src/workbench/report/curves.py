@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from workbench.arrays import FloatArray
+from workbench.campaign.verdict import WITHOUT_BOUND
 from workbench.report.layout import SMALLEST_DRAWN, log_axis
 from workbench.report.load import ErrorRow, Run, Series
 from workbench.report.style import ALARM, INK, PALETTE
@@ -126,7 +127,7 @@ def error_of_row(row: ErrorRow, series: Series, color: str) -> ErrorCurve | None
         return None
     error = np.abs(candidate - reference) / row.normaliser
     label = f"{row.candidate} − {row.reference}"
-    measured = row.kind in ("modelling", "unbounded")
+    measured = row.kind in WITHOUT_BOUND
     return ErrorCurve(series["t"], error, color, measured, label, (row.worst_time_s, row.peak_error))
 
 

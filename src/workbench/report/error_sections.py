@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from workbench.campaign.verdict import WITHOUT_BOUND
 from workbench.report.case_section import joint_heading
 from workbench.report.load import ErrorRow, Run
 from workbench.report.section import Section
@@ -142,7 +143,7 @@ def _by_joint(
             if found is None:
                 cells.append(Cell("–"))
                 continue
-            strong = found is largest if kind in ("modelling", "unbounded") else found.verdict == "expected-fail"
+            strong = found is largest if kind in WITHOUT_BOUND else found.verdict == "expected-fail"
             cells.append(Cell(number(found.peak_error), found.peak_error, emphasis=strong))
         loudest = next((row for row in by_joint.values() if row.verdict in FAILURES), largest)
         status = Cell(status=verdict_status(loudest.verdict))

@@ -12,16 +12,19 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow
-import pyarrow.parquet
 
 from workbench.arrays import FloatArray
 from workbench.errors import OutputError
-from workbench.reading import read_bytes
-from workbench.records import read_record, read_text, short
+from workbench.parquet_columns import read_columns
+from workbench.records import read_record, read_text
 from workbench.report.manifest import FORMAT_VERSION, Manifest
+from workbench.report.tables import KINDS, VERDICT_STATUS
 
 LARGEST_SERIES = 500_000_000
 """Bytes of one case's time series that are read."""
+
+LARGEST_VALUE = 1e100
+"""Magnitude of a number that a figure can show."""
 
 UNFINISHED = "journal.jsonl"
 """Holds the cases of a sweep while it runs, or after it was stopped."""
@@ -82,21 +85,18 @@ class Run:
         Raises
         ------
         OutputError
-            The file is missing, unreadable, or lacks a column that every series has.
+            The file is missing, unreadable, lacks a column that every series has, or holds what no run writes.
         """
         folder = self.directory / "series"
         path = folder / f"{case}.parquet"
         if path.parent != folder or case in ("", ".", ".."):
             raise OutputError(f"{self.directory}: case {case!r} cannot be a file name; allowed: one path component")
+        record = self.manifest.cases.get(case)
         try:
-            # read_table of a Python file leaves threads behind that abort an interpreter which ends soon after
-            buffer = pyarrow.BufferReader(read_bytes(path, LARGEST_SERIES))
-            table = pyarrow.parquet.ParquetFile(buffer).read(use_threads=False)
-            columns = {name: _floats(table.column(name)) for name in table.column_names}
+            table = read_columns(path, None, LARGEST_SERIES, rows=record.samples if record else None)
         except FileNotFoundError as error:
             raise OutputError(f"{path}: missing, though manifest.json lists case {case!r} as computed") from error
-        except (OSError, ValueError, pyarrow.ArrowException) as error:
-            raise OutputError(f"{path}: not a readable Parquet file ({short(error)})") from error
+        columns = {name: _floats(table.column(name)) for name in table.column_names}
         self._check_columns(path, columns)
         return columns
 
@@ -109,6 +109,19 @@ class Run:
                 raise OutputError(f'{path}: column "{name}" is missing; needed: {", ".join(needed)}', column=name)
         if len(columns["t"]) == 0:
             raise OutputError(f"{path}: holds no samples; allowed: at least 1")
+        for name, values in columns.items():
+            # a formula that failed has gaps; where the robot is, and when, is always known
+            right = (np.abs(values) <= LARGEST_VALUE) | (np.isnan(values) & (name not in needed))
+            if not right.all():
+                row = int(np.argmin(right))
+                raise OutputError(
+                    f"{path}: row {row + 1}: {name} is {values[row]:g}; allowed: -{LARGEST_VALUE:g} to"
+                    f" {LARGEST_VALUE:g}",
+                    column=name,
+                )
+        if not (np.diff(columns["t"]) > 0).all():
+            row = int(np.argmin(np.diff(columns["t"]) > 0)) + 1
+            raise OutputError(f"{path}: row {row + 1}: t does not grow; allowed: times in order", column="t")
 
 
 def _floats(column: pyarrow.ChunkedArray) -> FloatArray:
@@ -220,15 +233,23 @@ def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
         text = record[column]
         try:
             # Python reads 1_000 as a number; nobody writes so many digits
-            return float(text if "_" not in text and len(text) <= LONGEST_NUMBER else "?")
+            value = float(text if "_" not in text and len(text) <= LONGEST_NUMBER else "?")
         except ValueError as error:
             raise refused(column, "a number") from error
+        if LARGEST_VALUE < abs(value) < math.inf:
+            raise refused(column, f"at most {LARGEST_VALUE:g}, inf or nan")
+        return value
 
     def error(column: str) -> float:
         value = number(column)
         if value < 0:
             raise refused(column, "a number, 0 or more")
         return value
+
+    def word(column: str, valid: tuple[str, ...]) -> str:
+        if record[column] not in valid:
+            raise refused(column, ", ".join(valid))
+        return record[column]
 
     def count(column: str) -> int:
         value = number(column)
@@ -254,8 +275,8 @@ def _row(path: Path, line: int, record: Mapping[str, str]) -> ErrorRow:
         pointwise_error=error("pointwise_error"),
         worst_time_s=number("worst_time_s"),
         bound=bound(),
-        verdict=record["verdict"],
-        kind=record["kind"],
+        verdict=word("verdict", tuple(VERDICT_STATUS)),
+        kind=word("kind", KINDS),
         peak_reference=number("peak_reference"),
         unit=record["unit"],
         pointwise_skipped=count("pointwise_skipped"),

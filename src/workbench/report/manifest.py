@@ -301,6 +301,11 @@ class CaseRecord(Record):
     kinematics_checks: tuple[KinematicsRecord, ...] = ()
     warnings: tuple[str, ...] = ()
 
+    @property
+    def kinematics_verdicts(self) -> list[str]:
+        """Verdicts on the user's own kinematics."""
+        return [check.verdict for check in self.kinematics_checks]
+
 
 class ChangeRecord(Record):
     """One parameter that is not what the robot's source says, SI."""
@@ -346,10 +351,10 @@ class Manifest(Record):
     spec_file: str = ""
     spec: dict[str, Any] = Field(default_factory=dict)
     model: ModelRecord
-    joints: tuple[str, ...]
+    joints: tuple[str, ...] = Field(max_length=1000)
     coordinate_units: tuple[str, ...]
     force_units: tuple[str, ...]
-    platform_axes: tuple[str, ...] = ("x1", "x2", "x3")
+    platform_axes: tuple[str, ...] = Field(("x1", "x2", "x3"), max_length=6)
     mobility_count: dict[str, int] = Field(default_factory=dict)
     parameters: tuple[ParameterRecord, ...] = ()
     changes: ChangesRecord = ChangesRecord()

@@ -18,9 +18,13 @@ import matplotlib as mpl
 import typst
 from PIL import Image
 
+from workbench.campaign.changed import ANOTHER, NOT_JUDGED
+from workbench.errors import OutputError
+from workbench.records import reason
 from workbench.report.case_section import CaseView
 from workbench.report.cost import cost_table
 from workbench.report.load import Run
+from workbench.report.pictures import MOST_PIXELS
 from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.style import PAPERS
@@ -35,10 +39,6 @@ LONG = 36
 """Letters from which on a column of a table breaks its lines."""
 FONTS = {"page": "DejaVu Sans", "paper": "DejaVu Serif"}
 """Letters of drawings, by style: those that matplotlib brings and has measured them with."""
-CHANGED = (
-    "Another robot than the one that the campaign is about. Claims about that one are not judged where this concerns"
-    " them."
-)
 FIGURE = """#set document(date: none)
 #set page(width: auto, height: auto, margin: 0pt)
 #image("figure.svg")
@@ -57,7 +57,7 @@ def report_pdf(run: Run | SweepRun, sections: Sequence[Section], style: str = "p
         "campaign": manifest.campaign,
         "description": manifest.description,
         "run": " ".join(circumstances(manifest)),
-        "changed": CHANGED,
+        "changed": f"{ANOTHER}. {NOT_JUDGED}",
         "changes": list(changes(manifest)),
         "paper": PAPERS[paper],
         "costs": _table(costs) if costs else None,
@@ -98,12 +98,17 @@ def _drawing(plot: Plot, style: str) -> str:
     return standalone(plot.svg, plot.alt).replace("font-family: sans-serif", f"font-family: {FONTS[style]}")
 
 
-def _picture(content: bytes) -> str:
+def _picture(content: bytes, file: str) -> str:
     """A picture of pixels as SVG: Typst takes sources in memory as text alone."""
-    with Image.open(io.BytesIO(content)) as image:
-        width, height = image.size
-        buffer = io.BytesIO()
-        image.convert("RGB").save(buffer, format="png")
+    buffer = io.BytesIO()
+    try:
+        with Image.open(io.BytesIO(content), formats=["WEBP"]) as image:
+            width, height = image.size
+            if max(width, height) > MOST_PIXELS:
+                raise OutputError(f"{file}: {width} x {height} pixels; allowed: {MOST_PIXELS} along each edge")
+            image.convert("RGB").save(buffer, format="png")
+    except (OSError, ValueError, SyntaxError) as error:
+        raise OutputError(f"{file}: no WebP picture that can be read ({reason(error)})") from error
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
     size = f'width="{width}" height="{height}"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size}><image {size} href="data:image/png;base64,{data}"/></svg>'
@@ -144,7 +149,9 @@ def _figures(section: Section, views: Iterable[Any], style: str, parts: dict[str
     titles = {}
     for view in views:
         record = view.record
-        told = " ".join(text for text in (record.title, f"{record.source}." if record.source else "") if text)
+        source = f"{record.source}." if record.source else ""
+        other = f"Not for the robot of the source: {record.not_about}." if record.not_about else ""
+        told = " ".join(text for text in (record.title, source, other) if text)
         if view.plot is None:
             yield _text(f"{told} {view.missing}")
         else:
@@ -163,9 +170,11 @@ def _case(view: CaseView, style: str, parts: dict[str, str]) -> Iterator[Block]:
         yield {"kind": "notice", "text": f"Warning: {warning}"}
     yield {"kind": "facts", "facts": [list(fact) for fact in view.facts]}
     yield from _plots(view.plots, style, parts, {})
-    if view.film is not None and view.film.still:
+    if view.film is not None and view.film.note:
+        yield _text(f"No rendered picture: {view.film.note}.")
+    elif view.film is not None and view.film.still:
         name = f"{view.anchor}-still.svg"
-        parts[name] = _picture(view.film.still)
+        parts[name] = _picture(view.film.still, view.film.still_file)
         caption = "The robot's model as MuJoCo renders it, at the first moment of this case"
         yield {"kind": "plots", "plots": [_figure(name, caption, view.film.alt)], "wide": False}
     yield from map(_table, view.tables)
@@ -178,13 +187,14 @@ def _plots(plots: Sequence[Plot], style: str, parts: dict[str, str], titles: Map
         name = f"{plot.key}.svg"
         parts[name] = _drawing(plot, style)
         shown = _figure(name, titles.get(plot.key, plot.caption), plot.alt)
-        if plot.size[0] > FULL_WIDTH_FROM:
+        wide = plot.size[0] > FULL_WIDTH_FROM
+        if row and (wide or len(row) == 2):
+            yield {"kind": "plots", "plots": row, "wide": False}
+            row = []
+        if wide:
             yield {"kind": "plots", "plots": [shown], "wide": True}
         else:
             row.append(shown)
-        if len(row) == 2:
-            yield {"kind": "plots", "plots": row, "wide": False}
-            row = []
     if row:
         yield {"kind": "plots", "plots": row, "wide": False}
 
@@ -211,16 +221,20 @@ def _table(table: Table) -> Block:
             for column, length in zip(table.columns, longest, strict=True)
         ],
         "rows": [
-            [{"text": _shown(cell), "strong": cell.emphasis, "link": cell.link or "", **_colour(cell)} for cell in row]
+            [
+                {
+                    "text": _shown(cell),
+                    "strong": cell.emphasis,
+                    "link": cell.link or "",
+                    "status": cell.status.key if cell.status else "",
+                }
+                for cell in row
+            ]
             for row in table.rows
         ],
         "reading": table.reading,
     }
 
 
-def _colour(cell: Cell) -> Block:
-    return {"status": cell.status.key if cell.status else ""}
-
-
 def _shown(cell: Cell) -> str:
-    return f"{cell.status.symbol} {cell.status.text}".strip() if cell.status else cell.text
+    return _badge(cell.status)["badge"] if cell.status else cell.text

@@ -6,6 +6,7 @@ A report draws nothing itself: the same stored pictures give the same bytes on e
 from __future__ import annotations
 
 import base64
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -84,7 +85,7 @@ def film_of(run: Run) -> Film | None:
         The record is torn or of another format; a picture is missing, not WebP, or too large for a page.
     """
     path = run.directory / FOLDER / RECORD
-    if not path.exists():
+    if not os.path.lexists(path):
         return None
     record = read_record(path, PicturesRecord, FORMAT_VERSION)
     first = next(iter(run.manifest.cases), "")

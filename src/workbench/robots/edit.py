@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.errors import OutputError, ParameterError
+from workbench.output_file import refuse_target
 from workbench.robots.assignments import parse_assignment, resolve_changes
 from workbench.robots.catalogue import find_source
 from workbench.robots.inertia import refuse_impossible_bodies
@@ -128,7 +129,7 @@ def edit_file(
     if (in_place and found.robot is not None and found.robot.builtin) or (in_place and str(source) != found.shown):
         raise OutputError(f"{path} comes with the workbench and is not changed in place; write to another file")
     target = source if out is None else Path(out)
-    _refuse_target(target)
+    refuse_target(target)
     base = read_base(path)
     loaded, values = base.loaded, base.loaded.values
     if loaded.description is None or values is None:
@@ -176,36 +177,6 @@ def changed_lines(before: str, after: str) -> tuple[int, ...]:
     """Numbers, from 1, of the lines in which two versions of a model differ; an edit keeps the number of lines."""
     pairs = zip(before.split("\n"), after.split("\n"), strict=True)
     return tuple(index for index, (old, new) in enumerate(pairs, start=1) if old != new)
-
-
-def _refuse_target(target: Path) -> None:
-    try:
-        mode = os.lstat(target).st_mode
-    except FileNotFoundError:
-        if not target.parent.is_dir():
-            raise OutputError(f"{target}: there is no directory {target.parent}") from None
-        return
-    except (OSError, ValueError) as error:
-        raise OutputError(f"{str(target)!r}: {getattr(error, 'strerror', None) or error}") from error
-    if stat.S_ISLNK(mode):
-        raise OutputError(f"{target}: is a symbolic link; name the file that it leads to")
-    if not stat.S_ISREG(mode):
-        raise OutputError(f"{target}: is {'a directory' if stat.S_ISDIR(mode) else 'no regular file'}; name a file")
-    _refuse_protected(target)
-
-
-def _refuse_protected(target: Path) -> None:
-    """Refuse a file that its owner has protected, or that has a second name which would keep the old content."""
-    try:
-        status = os.lstat(target)
-    except OSError:
-        return
-    if not status.st_mode & stat.S_IWUSR or not os.access(target, os.W_OK):
-        raise OutputError(f"{target}: is read-only; make it writable or name another file")
-    if status.st_nlink > 1:
-        raise OutputError(
-            f"{target}: has {status.st_nlink} names (hard links), of which one would change; name another file"
-        )
 
 
 def _write(target: Path, text: str, source: Path) -> None:

@@ -71,7 +71,7 @@ def estimate(
         campaign = pick_cases(campaign, file, model, settings, only, users)
     if campaign.sweep is None:
         return _of_cases(campaign, file, model, settings, effort, users, only)
-    effort = Effort(effort.engines, budget=campaign.sweep.budget, drawing=False, timed=False, described=False)
+    effort = Effort.of_many(effort.engines, campaign.sweep.budget)
     plan = plan_sweep(campaign, file, model, settings, users)
     common = common_key(campaign, file, plan.model, settings, effort, campaign.sweep.keep_series, users)
     context = Context(campaign, file, plan.model, settings, effort, plan.recipe, common, names)

@@ -77,11 +77,13 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all."""
+    """Write a file whole or not at all; what a user names is judged before, by `output_file.refuse_target`."""
     temporary = path.with_name(f".{path.name}.part")
     try:
         temporary.write_bytes(content)
         os.replace(temporary, path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error  # not the name in between
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)

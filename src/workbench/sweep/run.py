@@ -150,7 +150,7 @@ def run_sweep(
     started, clock = datetime.now(UTC), time.perf_counter()
     assert campaign.sweep is not None
     keep_series = campaign.sweep.keep_series
-    effort = Effort(effort.engines, budget=campaign.sweep.budget, drawing=False, timed=False, described=False)
+    effort = Effort.of_many(effort.engines, campaign.sweep.budget)
     names = full_names(candidates)
     users = load_candidates(names)
     campaign = with_rows(campaign, users)

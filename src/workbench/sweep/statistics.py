@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from workbench.arrays import FloatArray
 from workbench.campaign.conclusion import Conclusion, conclude_sweep
 from workbench.campaign.spec import Campaign
-from workbench.campaign.verdict import CONTRAST, MODELLING, UNBOUNDED, VERIFICATION, kind_of
+from workbench.campaign.verdict import CONTRAST, VERIFICATION, WITHOUT_BOUND, kind_of
 from workbench.sweep import files
 from workbench.sweep.identity import FORMAT
 from workbench.sweep.plan import Plan
@@ -48,7 +48,7 @@ def summarise(directory: Path, plan: Plan, campaign: Campaign) -> dict[str, Any]
         for (candidate, reference), table in errors.items()
         for joint, values in table.items()
     ]
-    measured = {pair: table for pair, table in errors.items() if kinds[pair] in (MODELLING, UNBOUNDED)}
+    measured = {pair: table for pair, table in errors.items() if kinds[pair] in WITHOUT_BOUND}
     return {
         "format": FORMAT,
         "campaign": campaign.name,

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from workbench.campaign.conclusion import GOOD
+from workbench.campaign.verdict import WITHOUT_BOUND
 from workbench.report.section import Section
 from workbench.report.sweep.load import SweepRun
-from workbench.report.sweep.summary import MEASURED
 from workbench.report.sweep.varied import label_of
 from workbench.report.sweep.verdict import number, status_of
 from workbench.report.tables import Cell, Table, columns
@@ -28,11 +28,11 @@ def worst_section(run: SweepRun) -> Section | None:
     """List the designs with the largest errors, with what each of them is made of."""
     tables, names = [], []
     for place, (candidate, reference, kind) in enumerate(
-        sorted(run.summary.pairs, key=lambda pair: pair[2] not in MEASURED)
+        sorted(run.summary.pairs, key=lambda pair: pair[2] not in WITHOUT_BOUND)
     ):
-        indices = worst_cases(run, (candidate, reference), WORST[kind in MEASURED])
+        indices = worst_cases(run, (candidate, reference), WORST[kind in WITHOUT_BOUND])
         if indices:
-            tables.append(_worst_table(run, place, candidate, reference, kind in MEASURED, indices))
+            tables.append(_worst_table(run, place, candidate, reference, kind in WITHOUT_BOUND, indices))
             names.append(run.name(indices[0]))
     if not tables:
         return None

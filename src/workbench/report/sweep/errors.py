@@ -8,13 +8,14 @@ from matplotlib.figure import FigureBase
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from workbench.arrays import FloatArray
+from workbench.campaign.verdict import WITHOUT_BOUND
 from workbench.report.curves import DASHES
 from workbench.report.layout import SMALLEST_DRAWN, WIDE, figure_legend, legend_rows, size_of, stack
 from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.style import ALARM, INK, PALETTE
 from workbench.report.sweep.load import SweepRun
-from workbench.report.sweep.summary import ANY_JOINT, MEASURED, ErrorRecord
+from workbench.report.sweep.summary import ANY_JOINT, ErrorRecord
 from workbench.report.sweep.verdict import number
 from workbench.report.tables import Cell, Table, columns
 from workbench.report.text import exact, percent, scientific, slug
@@ -45,13 +46,13 @@ def limits_of(run: SweepRun, candidate: str, reference: str) -> tuple[float, ...
 
 def errors_section(run: SweepRun) -> Section | None:
     """Show, for each comparison, the distribution of the error over all designs; modelling errors first."""
-    pairs = sorted(run.summary.pairs, key=lambda pair: pair[2] not in MEASURED)
+    pairs = sorted(run.summary.pairs, key=lambda pair: pair[2] not in WITHOUT_BOUND)
     known = [pair for pair in pairs if np.isfinite(run.worst[pair[:2]]).any()]
     if not known:
         return None
     plots, tables, answers = [], [], []
     for place, (candidate, reference, kind) in enumerate(known):
-        if kind in MEASURED:
+        if kind in WITHOUT_BOUND:
             answers.append(_answer(run, candidate, reference))
         key = f"figure-errors-{slug(candidate)}-{slug(reference)}-{place + 1}"
         plots.append(_distribution_plot(run, key, candidate, reference, kind))
@@ -120,7 +121,7 @@ def _dependence(run: SweepRun, candidate: str, reference: str) -> str:
 
 
 def _table(run: SweepRun, place: int, candidate: str, reference: str, kind: str) -> Table:
-    modelling = kind in MEASURED
+    modelling = kind in WITHOUT_BOUND
     write = percent if modelling else scientific
     limits = limits_of(run, candidate, reference) if modelling else ()
     bound = run.bounds.get((candidate, reference))
@@ -170,7 +171,7 @@ def _values(run: SweepRun, candidate: str, reference: str, joint: str) -> FloatA
 
 
 def _distribution_plot(run: SweepRun, key: str, candidate: str, reference: str, kind: str) -> Plot:
-    modelling = kind in MEASURED
+    modelling = kind in WITHOUT_BOUND
     bound = run.bounds.get((candidate, reference))
     joints = run.manifest.joints
     worst = np.maximum(_values(run, candidate, reference, ANY_JOINT), SMALLEST_DRAWN)

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from workbench.arrays import FloatArray
 from workbench.errors import OutputError
-from workbench.reading import read_bytes
-from workbench.records import read_record, short
+from workbench.parquet_columns import read_columns
+from workbench.records import read_record
+from workbench.report.load import LARGEST_VALUE
 from workbench.report.manifest import Manifest
 from workbench.report.sweep.summary import FORMAT_VERSION, KeyRecord, Summary
 
@@ -25,6 +25,7 @@ LARGEST_PART = 2_000_000_000
 CONTRAST = "contrast"
 CASES, ROWS, SWEEP = "cases", "summary", "sweep.json"
 CASE_COLUMNS = ("index", "case", "status", "reason")
+TEXT_COLUMNS = frozenset({"case", "status", "reason", "candidate", "reference", "joint", "kind"})
 ROW_COLUMNS = ("index", "candidate", "reference", "joint", "kind", "peak_error", "bound")
 
 
@@ -88,6 +89,13 @@ def load_sweep(directory: Path, manifest: Manifest) -> SweepRun:
         raise OutputError(f"{directory / CASES}: {cases.num_rows} cases; {SWEEP} counts {summary.cases}")
     if cases.column("index").to_pylist() != list(range(summary.cases)):
         raise OutputError(f"{directory / CASES}: cases are not in order, or not all there; needed: 0, 1, 2, ...")
+    values = np.column_stack([cases.column(key).to_numpy() for key in keys]).astype(np.float64)
+    if not (np.abs(values) <= LARGEST_VALUE).all():
+        index, column = np.argwhere(~(np.abs(values) <= LARGEST_VALUE))[0]
+        raise OutputError(
+            f"{directory / CASES}: case {index}: {keys[column]} is {values[index, column]:g}; allowed:"
+            f" -{LARGEST_VALUE:g} to {LARGEST_VALUE:g}"
+        )
     errors, bounds = _read_errors(directory / ROWS, summary, manifest.joints)
     return SweepRun(
         directory,
@@ -96,7 +104,7 @@ def load_sweep(directory: Path, manifest: Manifest) -> SweepRun:
         names=cases.column("case"),
         status=np.array(cases.column("status").to_pylist(), dtype=object),
         reasons=cases.column("reason"),
-        values=np.column_stack([cases.column(key).to_numpy() for key in keys]).astype(np.float64),
+        values=values,
         errors=errors,
         bounds=bounds,
     )
@@ -118,14 +126,9 @@ def _tables(folder: Path, columns: tuple[str, ...]) -> list[pa.Table]:
 
 def _table(path: Path, columns: tuple[str, ...]) -> pa.Table:
     try:
-        with pq.ParquetFile(pa.BufferReader(read_bytes(path, LARGEST_PART))) as file:
-            known = file.schema_arrow.names
-            missing = [name for name in columns if name not in known]
-            if missing:
-                raise OutputError(f'{path}: column "{missing[0]}" is missing', column=missing[0])
-            return file.read(columns=list(columns), use_threads=False)
-    except (OSError, ValueError, pa.ArrowException) as error:
-        raise OutputError(f"{path}: not a readable Parquet file ({short(error)})") from error
+        return read_columns(path, columns, LARGEST_PART, TEXT_COLUMNS, ("index",))
+    except FileNotFoundError as error:  # in this moment: its name has just been listed
+        raise OutputError(f"{path}: missing") from error
 
 
 def _read_errors(
@@ -138,7 +141,13 @@ def _read_errors(
         table = _table(path, ROW_COLUMNS)
         index, value = table.column("index").to_numpy(), table.column("peak_error").to_numpy()
         if len(index) and not (index.min() >= 0 and index.max() < summary.cases):
-            raise OutputError(f"{path}: case number {index.max()}; allowed: 0 to {summary.cases - 1}", column="index")
+            wrong = index.min() if index.min() < 0 else index.max()
+            raise OutputError(f"{path}: case number {wrong}; allowed: 0 to {summary.cases - 1}", column="index")
+        if ((value < 0) | (value > LARGEST_VALUE) & (value < np.inf)).any():
+            raise OutputError(
+                f"{path}: a peak_error below 0 or beyond {LARGEST_VALUE:g}; allowed: 0 or more, inf, nan",
+                column="peak_error",
+            )
         bound = table.column("bound").to_numpy()
         judged = ~_is(table, "kind", CONTRAST)
         for pair in pairs:

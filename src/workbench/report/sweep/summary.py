@@ -12,9 +12,6 @@ FORMAT_VERSION = 1
 """The version of sweep.json that this reader understands."""
 ANY_JOINT = "any"
 """stands for the largest error over the joints"""
-MODELLING = "modelling"
-MEASURED = (MODELLING, "unbounded")
-"""Kinds of comparisons that have no bound."""
 
 
 class KeyRecord(Record):

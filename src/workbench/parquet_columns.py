@@ -1,0 +1,99 @@
+"""Columns of a Parquet file that somebody may have edited: judged by what the file says of itself, then read."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from workbench.errors import OutputError
+from workbench.reading import read_bytes
+from workbench.records import short
+
+MOST_VALUES = 200_000_000
+"""Rows times columns that are read at once, 1.6 GB: ten bytes of a file can stand for a million rows."""
+
+
+def read_columns(
+    path: Path,
+    names: Sequence[str] | None,
+    largest: int,
+    texts: Collection[str] = (),
+    indices: Collection[str] = (),
+    rows: int | None = None,
+) -> pa.Table:
+    """Read columns of a Parquet file of a run directory.
+
+    Parameters
+    ----------
+    path
+        The file.
+    names
+        Columns that are read; None is all of them.
+    largest
+        Bytes of the file that are read.
+    texts, indices
+        Columns of texts, and of whole numbers without a gap; all others hold numbers.
+    rows
+        How many rows there are to be; None where nobody knows.
+
+    Raises
+    ------
+    FileNotFoundError
+        It is missing.
+    OutputError
+        One line that names the file and the column: unreadable, missing, there twice, of another type, too many rows.
+    """
+    try:
+        # read_table of a Python file leaves threads behind that abort an interpreter which ends soon after
+        with pq.ParquetFile(pa.BufferReader(read_bytes(path, largest))) as file:
+            chosen = _judged(path, file, names, texts, indices, rows)
+            table = file.read(columns=chosen, use_threads=False)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, pa.ArrowException) as error:
+        raise OutputError(f"{path}: not a readable Parquet file ({short(error)})") from error
+    for name in indices:
+        if table.column(name).null_count:
+            raise OutputError(f'{path}: column "{name}" has gaps; allowed: whole numbers', column=name)
+    return table
+
+
+def _is_text(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
+
+
+def _judged(
+    path: Path,
+    file: pq.ParquetFile,
+    names: Sequence[str] | None,
+    texts: Collection[str],
+    indices: Collection[str],
+    rows: int | None,
+) -> list[str]:
+    known = file.schema_arrow.names
+    chosen = list(known if names is None else names)
+    for name in chosen:
+        if known.count(name) != 1:
+            found = f"stands {known.count(name)} times" if name in known else "is missing"
+            raise OutputError(f'{path}: column "{name[:60]}" {found}', column=name)
+        kind = file.schema_arrow.field(name).type
+        if name in texts:
+            fits, allowed = _is_text(kind.value_type if pa.types.is_dictionary(kind) else kind), "texts"
+        elif name in indices:
+            fits, allowed = pa.types.is_integer(kind), "whole numbers"
+        else:
+            fits = pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind)
+            allowed = "numbers"
+        if not fits:
+            raise OutputError(
+                f'{path}: column "{name[:60]}" is of type {str(kind)[:60]}; allowed: {allowed}', column=name
+            )
+    count = file.metadata.num_rows
+    if rows is not None and count != rows:
+        raise OutputError(f"{path}: {count} rows, where manifest.json has {rows} samples")
+    if count * len(chosen) > MOST_VALUES:
+        raise OutputError(f"{path}: {count} rows of {len(chosen)} columns; allowed: {MOST_VALUES} values")
+    return chosen
