@@ -50,8 +50,7 @@ def differences(reference: wb.MujocoReference, seed: int, **spoiled: Any) -> flo
     model, mechanism = reference.compiled(), reference._closer.mechanism
     assert mechanism is not None
     kinematics = mechanism.kinematics._replace(**spoiled)
-    sites = int(kinematics.points.max()) + 1 if len(kinematics.points) else 1
-    places, data, rng = room(kinematics, sites, model.nv), mujoco.MjData(model), np.random.default_rng(seed)
+    places, data, rng = room(kinematics, model.nv), mujoco.MjData(model), np.random.default_rng(seed)
     worst = 0.0
     for _ in range(3):
         qpos = np.array(model.qpos0) + rng.normal(0, 1.0, model.nq)

@@ -18,7 +18,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError
-from workbench.reference.closing import Mechanism, follow_chain
+from workbench.reference.closing import CHAIN, Mechanism, advance, bench
 from workbench.reference.continuation import CORRECTION, LONGEST_STEP, NEGLIGIBLE, SMALLEST_STEP, Assembly, Continuation
 from workbench.reference.engine import Evaluator
 from workbench.reference.kinds import SCALAR
@@ -109,11 +109,13 @@ class OrderedClosure(Continuation):
         self._reach(q, firsts[:1], self._home, home[:1], row[:1], found)
         known = np.ones(len(firsts), dtype=np.bool_)
         known[1:] = self._reach(q, firsts[1:], self._home, home[1:], row[1:], found, SMALLEST_STEP)
-        ends = np.zeros(len(firsts), dtype=np.int64)
+        ends, unused = np.zeros(len(firsts), dtype=np.int64), np.zeros(0)
 
         def chunk(_: Evaluator | None, rows: slice) -> None:
             if known[rows.start // CHUNK]:
-                ends[rows.start // CHUNK] = follow_chain(mechanism, rules, q, rows.start, rows.stop, *found.arrays)
+                ends[rows.start // CHUNK] = advance(
+                    mechanism, rules, bench(mechanism), CHAIN, q, q, rows.start + 1, rows.stop, *found.arrays, unused
+                )
 
         self.engine.in_blocks(chunk, n, CHUNK)
         step = self._nothing(n if len(firsts) > 1 else 0, q.shape[1])

@@ -20,7 +20,8 @@ from workbench.reference.linear import factor, solved
 from workbench.reference.rows import constraint_rows
 from workbench.reference.tables import ClosureTables
 
-ARRIVED, BLOCKED = 1, 0
+NEAR, LINES, CHAIN = 0, 1, 2
+"""Ways to close samples, see `advance`."""
 
 
 class Mechanism(NamedTuple):
@@ -60,12 +61,19 @@ class Bench(NamedTuple):
     """Room for the work on one sample."""
 
     places: Places
+    seen: Places
+    """views of the same that may not be written to, as MuJoCo's own: to kernels another type"""
     qpos: FloatArray
     kept: FloatArray
     predicted: FloatArray
+    here: FloatArray
+    """the closed configuration that a way begins at, and then the last one reached"""
     tangent: FloatArray
+    tangent_here: FloatArray
+    tangent_before: FloatArray
     facts: FloatArray
     """``(4,)`` residual, rank, condition, weakest"""
+    facts_here: FloatArray
     jacobian: FloatArray
     residual: FloatArray
     a: FloatArray
@@ -73,67 +81,58 @@ class Bench(NamedTuple):
     order: np.ndarray
     x: FloatArray
     step: FloatArray
+    bend: FloatArray
+    """``(nv,)`` added to the first prediction before Newton begins: what the tangent's own change is worth"""
     best: FloatArray
+    ways: FloatArray
+    """``(4, na)`` the way, where a step leads, its change, and where the way begins"""
 
 
-@compiled
-def bench(mechanism):  # type: ignore[no-untyped-def]
-    """Room for one sample of a mechanism."""
-    closures = mechanism.closures
-    m, p, na = closures.block_rows[-1], mechanism.passive.shape[0], mechanism.actuated.shape[0]
-    nq, nv = mechanism.coordinate_weights.shape[0], mechanism.weights.shape[0]
-    points = mechanism.kinematics.points
-    sites = points.max() + 1 if points.shape[0] else 1
+def bench(mechanism: Mechanism) -> Bench:
+    """Room for one sample of a mechanism. Made by NumPy: compiled, making it takes longer than all that it is for."""
+    m, p, na = int(mechanism.closures.block_rows[-1]), len(mechanism.passive), len(mechanism.actuated)
+    nq, nv = len(mechanism.coordinate_weights), len(mechanism.weights)
+    places = room(mechanism.kinematics, nv)
+    seen = Places(*(array.view() for array in places))
+    for array in seen:
+        array.flags.writeable = False
     return Bench(
-        room(mechanism.kinematics, sites, nv), np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros((nv, na)),
-        np.zeros(4), np.zeros((m, nv)), np.zeros(m), np.zeros((m, p + na + 1)), np.zeros(p),
-        np.zeros(p, dtype=np.int64), np.zeros(p), np.zeros(nv), np.zeros(1),
+        places, seen, np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros((nv, na)),
+        np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros((m, nv)), np.zeros(m),
+        np.zeros((m, p + na + 1)), np.zeros(p), np.zeros(p, dtype=np.int64), np.zeros(p), np.zeros(nv), np.zeros(nv),
+        np.zeros(1), np.zeros((4, na)),
     )  # fmt: skip
 
 
 @inlined
-def _factored(mechanism, w):  # type: ignore[no-untyped-def]
+def _factored(passive, actuated, jacobian, residual, a, beta, order):  # type: ignore[no-untyped-def]
     """Factor the passive columns of the Jacobian, the actuated ones and the residual along; returns the rank."""
-    passive, actuated = mechanism.passive, mechanism.actuated
     p, na = passive.shape[0], actuated.shape[0]
-    for i in range(w.a.shape[0]):
+    for i in range(a.shape[0]):
         for j in range(p):
-            w.a[i, j] = w.jacobian[i, passive[j]]
+            a[i, j] = jacobian[i, passive[j]]
         for j in range(na):
-            w.a[i, p + j] = -w.jacobian[i, actuated[j]]
-        w.a[i, p + na] = -w.residual[i]
-    return factor(w.a, w.beta, w.order)
+            a[i, p + j] = -jacobian[i, actuated[j]]
+        a[i, p + na] = -residual[i]
+    return factor(a, beta, order)
 
 
 @inlined
-def _stepped(mechanism, found, w):  # type: ignore[no-untyped-def]
-    """Take a Newton step of the passive joints from `Bench.qpos`, by the last factor."""
-    passive = mechanism.passive
-    solved(w.a, w.order, found, w.a.shape[1] - 1, w.x)
-    for j in range(passive.shape[0]):
-        w.step[passive[j]] = w.x[j]
-    for j in range(mechanism.actuated.shape[0]):
-        w.step[mechanism.actuated[j]] = 0.0
-    integrate(w.qpos, w.step, mechanism.joints, w.qpos)
-
-
-@inlined
-def _noted(mechanism, found, w):  # type: ignore[no-untyped-def]
+def _noted(passive, actuated, a, order, found, x, tangent, facts):  # type: ignore[no-untyped-def]
     """Velocities per actuated velocity, rank, condition and weakest freedom, from the last factor."""
-    passive, actuated = mechanism.passive, mechanism.actuated
     p, na = passive.shape[0], actuated.shape[0]
     for j in range(na):
-        solved(w.a, w.order, found, p + j, w.x)
+        solved(a, order, found, p + j, x)
         for k in range(p):
-            w.tangent[passive[k], j] = w.x[k]
+            tangent[passive[k], j] = x[k]
         for k in range(na):
-            w.tangent[actuated[k], j] = 1.0 if k == j else 0.0
-    w.facts[1] = found
+            tangent[actuated[k], j] = 1.0 if k == j else 0.0
+    facts[1] = found
     if p == 0:  # an open chain: nothing to solve for
-        w.facts[2], w.facts[3] = 1.0, actuated[0]
+        facts[2], facts[3] = 1.0, actuated[0]
     else:
-        w.facts[2] = abs(w.a[0, 0] / w.a[p - 1, p - 1]) if found == p else math.inf
-        w.facts[3] = passive[w.order[min(found, p - 1)]]
+        facts[2] = abs(a[0, 0] / a[p - 1, p - 1]) if found == p else math.inf
+        facts[3] = passive[order[min(found, p - 1)]]
 
 
 @compiled
@@ -143,25 +142,31 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     The best configuration met goes to `Bench.kept`, its residual to `Bench.facts`; where it is closed, also tangent,
     rank, condition and weakest freedom.
     """
-    kin, closures, places = mechanism.kinematics, mechanism.closures, w.places
+    kin, closures, joints, seen = mechanism.kinematics, mechanism.closures, mechanism.joints, w.seen
+    passive, actuated, qpos, step, x = mechanism.passive, mechanism.actuated, w.qpos, w.step, w.x
     limits = (rules.closed, rules.floor, rules.astray, rules.settles)
     w.best[0] = math.inf
     w.facts[1], w.facts[2], w.facts[3] = 0.0, math.inf, 0.0
     for _ in range(rules.steps):
-        place(kin, w.qpos, places)
+        place(kin, qpos, w.places)
         constraint_rows(
-            closures, mechanism.joints, w.qpos, places.cdof, kin.centre, places.site_xpos, places.site_xquat,
-            places.anchors, w.jacobian, w.residual,
+            closures, joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat, seen.anchors, w.jacobian,
+            w.residual,
         )  # fmt: skip
-        again, good = keep_if_better(w.residual, limits, w.qpos, w.kept, w.best, 0)
+        again, good = keep_if_better(w.residual, limits, qpos, w.kept, w.best, 0)
         if not (again or good):
             break
-        found = _factored(mechanism, w)
+        found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order)
         if good:
-            _noted(mechanism, found, w)
+            _noted(passive, actuated, w.a, w.order, found, x, w.tangent, w.facts)
         if not again:
             break
-        _stepped(mechanism, found, w)
+        solved(w.a, w.order, found, w.a.shape[1] - 1, x)
+        for j in range(actuated.shape[0]):
+            step[actuated[j]] = 0.0
+        for j in range(passive.shape[0]):
+            step[passive[j]] = x[j]
+        integrate(qpos, step, joints, qpos)
     w.facts[0] = w.best[0]
 
 
@@ -182,128 +187,132 @@ def _length(values, weights):  # type: ignore[no-untyped-def]
     return math.sqrt(squared)
 
 
-@compiled
-def follow_line(mechanism, rules, w, qpos, tangent, facts, origin, target, bend):  # type: ignore[no-untyped-def]
-    """Follow the straight line from *origin* to *target* ``(na,)``; returns whether it arrived, and how far it came.
+@inlined
+def _copy(values, out):  # type: ignore[no-untyped-def]
+    """Loops: assigning a slice takes numba seconds to compile."""
+    for i in range(out.shape[0]):
+        out[i] = values[i]
 
-    ``qpos``, ``tangent`` and ``facts`` are the closed configuration at *origin*, and then the last one reached.
-    ``bend (nv,)`` is added to the first prediction before Newton begins, and to nothing else: what the tangent's own
-    change is worth over the whole way.
+
+@inlined
+def _copy_rows(values, out):  # type: ignore[no-untyped-def]
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = values[i, j]
+
+
+@inlined
+def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
+    """Follow the straight line from ``Bench.ways[3]`` to *target* ``(na,)``; returns how much of it was gone, 0 to 1.
+
+    ``Bench.here`` and its like are the closed configuration at the beginning, and then the last one reached.
     """
-    na = target.shape[0]
-    way, aim, change = np.empty(na), np.empty(na), np.empty(na)
+    way, aim, change, origin = w.ways[0], w.ways[1], w.ways[2], w.ways[3]
+    na = way.shape[0]
     for j in range(na):
         way[j] = target[j] - origin[j]
     done, step = 0.0, 1.0
     while done < 1.0:
-        _along(tangent, way, w.step)
+        _along(w.tangent_here, way, w.step)
         longest = rules.almost * rules.longest / _length(w.step, mechanism.weights)
         part = min(step, 1.0 - done, longest)
         last = done + part >= 1.0
         for j in range(na):
             aim[j] = target[j] if last else origin[j] + way[j] * (done + part)
             change[j] = way[j] * part
-        _along(tangent, change, w.step)
+        _along(w.tangent_here, change, w.step)
         moved = _length(w.step, mechanism.weights)
-        integrate(qpos, w.step, mechanism.joints, w.predicted)
+        integrate(w.here, w.step, mechanism.joints, w.predicted)
         if part == 1.0:
             for d in range(w.step.shape[0]):
-                w.step[d] += bend[d]
-            integrate(qpos, w.step, mechanism.joints, w.qpos)
-        else:
-            w.qpos[:] = w.predicted
+                w.step[d] += w.bend[d]
+        integrate(w.here, w.step, mechanism.joints, w.qpos)
         for j in range(na):
             w.qpos[mechanism.actuated_qpos[j]] = w.predicted[mechanism.actuated_qpos[j]] = aim[j]
         close_one(mechanism, rules, w)
         squared = 0.0
-        for i in range(qpos.shape[0]):
+        for i in range(w.here.shape[0]):
             squared += ((w.kept[i] - w.predicted[i]) * mechanism.coordinate_weights[i]) ** 2
         correction = math.sqrt(squared)
         small = correction <= max(rules.correction * moved, rules.negligible)
         if w.facts[0] <= rules.closed and small and moved <= rules.longest:
-            qpos[:] = w.kept
-            tangent[:, :] = w.tangent
-            facts[:] = w.facts
+            _copy(w.kept, w.here)
+            _copy_rows(w.tangent, w.tangent_here)
+            _copy(w.facts, w.facts_here)
             done = 1.0 if last else done + part
             step *= 2.0
             if longest < rules.smallest and done < 1.0:
-                return False, done
+                return done
         else:
             step = 0.5 * part
             if not step >= rules.smallest:
-                return False, done
-    return True, done
-
-
-@compiled
-def close_many(mechanism, rules, start, qpos, residual, tangent, rank, condition, weakest):  # type: ignore[no-untyped-def]
-    """`close_one` from each of ``start (n, nq)``."""
-    w = bench(mechanism)
-    for s in range(start.shape[0]):
-        w.qpos[:] = start[s]
-        close_one(mechanism, rules, w)
-        _stored(w.kept, w.tangent, w.facts, qpos, residual, tangent, rank, condition, weakest, s)
-        if not w.facts[0] <= rules.closed:
-            tangent[s] = 0.0
+                return done
+    return done
 
 
 @inlined
-def _stored(here, tangents, facts, qpos, residual, tangent, rank, condition, weakest, s):  # type: ignore[no-untyped-def]
-    qpos[s] = here
-    tangent[s] = tangents
-    residual[s], rank[s], condition[s], weakest[s] = facts[0], np.int64(facts[1]), facts[2], np.int64(facts[3])
-
-
-@compiled
-def follow_lines(  # type: ignore[no-untyped-def]
-    mechanism, rules, origin, target, qpos, residual, tangent, rank, condition, weakest, done
-):  # fmt: skip
-    """Follow straight lines from closed configurations ``(n, nq)`` at *origin* to *target* ``(n, na)``.
-
-    The arrays hold the configurations at *origin* and then those reached; ``done (n,)`` becomes the part of each way
-    that was gone. A way may be blocked, then the rest is not looked at if it must not be: see `Rules.smallest`.
-    """
-    w = bench(mechanism)
-    here, tangents, facts, bend = w.qpos.copy(), w.tangent.copy(), w.facts.copy(), np.zeros(w.step.shape[0])
-    for s in range(origin.shape[0]):
-        here[:] = qpos[s]
-        tangents[:, :] = tangent[s]
-        facts[0], facts[1], facts[2], facts[3] = residual[s], rank[s], condition[s], weakest[s]
-        _arrived, done[s] = follow_line(mechanism, rules, w, here, tangents, facts, origin[s], target[s], bend)
-        _stored(here, tangents, facts, qpos, residual, tangent, rank, condition, weakest, s)
-
-
-@compiled
-def follow_chain(  # type: ignore[no-untyped-def]
-    mechanism, rules, target, first, last, qpos, residual, tangent, rank, condition, weakest
-):  # fmt: skip
-    """Follow a motion: samples first + 1 to last - 1 of ``target (n, na)``, each from its predecessor.
-
-    Returns the first sample that was not reached, or *last*. Newton begins where the change of the tangent over the
-    step before, carried on, leads; what is accepted is judged from the tangent alone, as everywhere.
-    """
-    w = bench(mechanism)
-    nv, na = w.tangent.shape
-    here, tangents, facts, bend = qpos[first].copy(), tangent[first].copy(), w.facts.copy(), np.zeros(nv)
-    before, way = tangents.copy(), np.zeros(na)
-    straight = False
-    size = 0.0
-    for s in range(first + 1, last):
-        longer = 0.0
+def _bend(w, target, s, size):  # type: ignore[no-untyped-def]
+    """Fill `Bench.bend` for the step to sample *s*, after one of length *size* or, for NaN, none; returns it."""
+    na = target.shape[1]
+    longer = 0.0
+    for j in range(na):
+        longer += (target[s, j] - target[s - 1, j]) ** 2
+    longer = math.sqrt(longer)
+    scale = 0.5 * longer / size if size > 0.0 else 0.0
+    for d in range(w.bend.shape[0]):
+        value = 0.0
         for j in range(na):
-            way[j] = target[s, j] - target[s - 1, j]
-            longer += way[j] ** 2
-        longer = math.sqrt(longer)
-        scale = 0.5 * longer / size if straight and size > 0.0 else 0.0
-        for d in range(nv):
-            value = 0.0
-            for j in range(na):
-                value += (tangents[d, j] - before[d, j]) * way[j]
-            bend[d] = scale * value
-        before[:, :] = tangents
-        arrived, _done = follow_line(mechanism, rules, w, here, tangents, facts, target[s - 1], target[s], bend)
-        if not arrived:
-            return s
-        size, straight = longer, True
-        _stored(here, tangents, facts, qpos, residual, tangent, rank, condition, weakest, s)
+            value += (w.tangent_here[d, j] - w.tangent_before[d, j]) * (target[s, j] - target[s - 1, j])
+        w.bend[d] = scale * value
+    return longer
+
+
+@compiled
+def advance(  # type: ignore[no-untyped-def]
+    mechanism, rules, w, how, start, target, first, last, qpos, residual, tangent, rank, condition, weakest, done
+):  # fmt: skip
+    """Close samples *first* to *last* - 1 in one of three ways; a single kernel, which compiles once.
+
+    `NEAR`: Newton alone, from each of ``start (n, nq)``. `LINES`: along straight lines from ``start (n, na)`` to
+    ``target (n, na)``; the arrays hold the configurations at the start, then those reached, and ``done (n,)`` becomes
+    the part of each way that was gone. `CHAIN`: a motion ``target (n, na)``, each sample from the one before, the first
+    from the arrays' row before it; Newton begins where the change of the tangent over the step before, carried on,
+    leads, and what is accepted is judged from the tangent alone, as everywhere.
+
+    Returns the first sample of a chain that was not reached, else *last*.
+    """
+    size = math.nan
+    for d in range(w.bend.shape[0]):
+        w.bend[d] = 0.0
+    for s in range(first, last):
+        if how == NEAR:
+            _copy(start[s], w.qpos)
+            close_one(mechanism, rules, w)
+            _copy(w.kept, w.here)
+            _copy(w.facts, w.facts_here)
+            for i in range(w.tangent.shape[0]):
+                for j in range(w.tangent.shape[1]):
+                    w.tangent_here[i, j] = w.tangent[i, j] if w.facts[0] <= rules.closed else 0.0
+        else:
+            if how == LINES or s == first:
+                r = s if how == LINES else s - 1
+                _copy(qpos[r], w.here)
+                _copy_rows(tangent[r], w.tangent_here)
+                w.facts_here[0], w.facts_here[1] = residual[r], rank[r]
+                w.facts_here[2], w.facts_here[3] = condition[r], weakest[r]
+            if how == LINES:
+                _copy(start[s], w.ways[3])
+            else:
+                _copy(target[s - 1], w.ways[3])
+                size = _bend(w, target, s, size)
+                _copy_rows(w.tangent_here, w.tangent_before)
+            gone = _follow_line(mechanism, rules, w, target[s])
+            if how == LINES:
+                done[s] = gone
+            elif gone < 1.0:
+                return s
+        _copy(w.here, qpos[s])
+        _copy_rows(w.tangent_here, tangent[s])
+        residual[s], rank[s] = w.facts_here[0], np.int64(w.facts_here[1])
+        condition[s], weakest[s] = w.facts_here[2], np.int64(w.facts_here[3])
     return last

@@ -12,7 +12,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
 from workbench.reference.along import OrderedClosure
-from workbench.reference.closing import Mechanism, close_many, follow_lines
+from workbench.reference.closing import LINES, NEAR, Mechanism, advance, bench
 from workbench.reference.continuation import ASTRAY, NEWTON_STEPS, SMALLEST_STEP, Assembly
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import integrate, newton_step
@@ -162,7 +162,8 @@ class LoopCloser(OrderedClosure):
         start[:, self.structure.actuated_qpos] = aim
         found = self._nothing(count, aim.shape[1])
         if self.mechanism is not None:
-            close_many(self.mechanism, self.rules(), start, *found.arrays)
+            room = bench(self.mechanism)
+            advance(self.mechanism, self.rules(), room, NEAR, start, start, 0, count, *found.arrays, np.zeros(0))
             return found
         qpos = evaluator.qpos
         qpos[:count] = start
@@ -193,7 +194,10 @@ class LoopCloser(OrderedClosure):
             return super()._continue(evaluator, here, origin, target, names, marked_below)
         done = np.zeros(len(target))
         rules = self.rules(marked_below or SMALLEST_STEP)
-        follow_lines(self.mechanism, rules, np.array(origin), np.array(target), *here.arrays, done)
+        advance(
+            self.mechanism, rules, bench(self.mechanism), LINES, np.array(origin), np.array(target), 0, len(target),
+            *here.arrays, done,
+        )  # fmt: skip
         if (done < 1.0).any() and not marked_below:
             row = int(np.argmax(done < 1.0))
             reached = origin[row] + (target[row] - origin[row]) * done[row]

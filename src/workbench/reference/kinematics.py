@@ -96,6 +96,8 @@ def kinematics_of(model: mujoco.MjModel, frames: Frames, points: IntArray, home:
     bodies = np.concatenate([np.asarray(model.site_bodyid, dtype=np.int64).reshape(-1), frames.bodies])
     positions = np.concatenate([np.asarray(model.site_pos).reshape(-1, 3), frames.positions])
     turns = np.concatenate([np.asarray(model.site_quat).reshape(-1, 4), frames.quaternions])
+    centre = np.array(data.subtree_com, dtype=np.float64)[np.asarray(model.body_rootid)]
+    centre.flags.writeable = False  # as the engine's own: for the kernels another type
     return Kinematics(
         parent=np.array(model.body_parentid, dtype=np.int64),
         body_pos=np.array(model.body_pos, dtype=np.float64),
@@ -112,24 +114,20 @@ def kinematics_of(model: mujoco.MjModel, frames: Frames, points: IntArray, home:
         point_body=bodies[points],
         point_pos=positions[points],
         point_quat=turns[points],
-        centre=np.array(data.subtree_com, dtype=np.float64)[np.asarray(model.body_rootid)],
+        centre=centre,
     )
 
 
-@compiled
-def room(kinematics, sites, freedoms):  # type: ignore[no-untyped-def]
-    """Room for one sample of a model with so many sites and frames, and freedoms."""
-    bodies, joints = kinematics.parent.shape[0], kinematics.kind.shape[0]
+def room(kinematics: Kinematics, freedoms: int) -> Places:
+    """Room for one sample of a model with so many freedoms."""
+    bodies, joints = len(kinematics.parent), len(kinematics.kind)
+    points = int(kinematics.points.max()) + 1 if len(kinematics.points) else 1
     xquat = np.zeros((bodies, 4))
     xquat[0, 0] = 1.0
     return Places(
-        np.zeros((bodies, 3)),
-        xquat,
-        np.zeros((joints, 3)),
-        np.zeros((freedoms, 6)),
-        np.zeros((sites, 3)),
-        np.zeros((sites, 4)),
-    )
+        np.zeros((bodies, 3)), xquat, np.zeros((joints, 3)), np.zeros((freedoms, 6)), np.zeros((points, 3)),
+        np.zeros((points, 4)),
+    )  # fmt: skip
 
 
 @inlined
