@@ -20,6 +20,7 @@ import json
 import random
 import tempfile
 import time
+import warnings
 from collections import Counter, defaultdict
 from pathlib import Path
 from types import SimpleNamespace
@@ -44,10 +45,10 @@ from workbench.diagnosis.edits import (
     edits_of,
 )
 from workbench.diagnosis.entries import WRONG_MARK, compare_parts, floors_of
+from workbench.diagnosis.paper import groups_of, lines_run, missing_in
 from workbench.diagnosis.parts import FORCE, ODD, REST, take_apart
 from workbench.diagnosis.probes import ask, choose_poses, make_plan
 from workbench.diagnosis.result import NUMERIC
-from workbench.diagnosis.search import groups_of, lines_run
 from workbench.diagnosis.surface import subjects
 from workbench.errors import WorkbenchError
 
@@ -82,7 +83,7 @@ def formulas(folder: Path, names: list[str]) -> dict[str, tuple[Path, Path, str]
         path.write_text(text)
         campaign = "garcia_murillo_2016" if name == "screws" else "almeida_2010"
         found[name] = ROOT / "campaigns" / f"{campaign}.toml", path, f"printed-{name}"
-    for home, candidate in ((ROOT / "examples" / "delta", "exact"), (ROOT / "benchmarks" / "rrr", "virtual-work")):
+    for home, candidate in ((ROOT / "examples" / "delta", "exact"), (ROOT / "examples" / "rrr", "exact")):
         name = home.name
         found[name] = home / f"{name}.toml", home / f"{name}.py", candidate
     return {name: found[name] for name in names if name in found}
@@ -172,6 +173,7 @@ class Bench:
         for edit in edits:
             if edit.kind in KINDS:
                 self.by_kind[edit.kind].append(edit)
+        self.lines, self.groups = lines, groups
         self.redrawn = 0
 
     def truth(self, subject):
@@ -233,6 +235,13 @@ class Bench:
             return subject, kinds, lines, truth, text
         raise SystemExit("no mistake to be planted")
 
+    def undoable(self, text: str, line: int, wanted: str, seen) -> bool:
+        """Whether any of the edits that are tried gives the original line back."""
+        edits = edits_of(text, self.lines, self.groups, len(self.subject.joints), missing_in(seen))
+        return any(
+            _same(edit.apply(text).splitlines()[line - 1], wanted) for edit in edits if abs(edit.line - line) < 3
+        )
+
 
 def judged(bench: Bench, subject, truth, text: str, lines: list[int], mend: bool, limit: float) -> dict:
     """What the diagnosis says of one planted formula, held against the truth."""
@@ -261,19 +270,16 @@ def judged(bench: Bench, subject, truth, text: str, lines: list[int], mend: bool
     }
     if mend:
         begun = time.process_time()
-        found, _ = search.search_mends(subject, seen, limit)
+        found, notes = search.search_mends(subject, seen, limit)
         row["seconds_search"] = round(time.process_time() - begun, 2)
         want = bench.text.splitlines()
         steps = sorted({s.step for s in found})
-        got = 0
-        for line in lines:
-            for step in steps:
-                alike = [s for s in found if s.step == step][:3]
-                if any(s.line == line and _same(s.after, want[line - 1]) for s in alike):
-                    got += 1
-                    break
-        row["undone"] = got == len(lines)
-        row["complete"] = bool(found) and found[-1].left == 0
+        first = [s for step in steps for s in [s for s in found if s.step == step][:3]]
+        row["complete"] = bool(found) and found[-1].left == 0 and not any("a part of it" in note for note in notes)
+        row["undone"] = all(any(s.line == n and _same(s.after, want[n - 1]) for s in first) for n in lines)
+        # the original line, or one that computes the same on all robots and at all poses looked at
+        row["mended"] = row["undone"] or (row["complete"] and all(any(s.line == n for s in first) for n in lines))
+        row["undoable"] = all(bench.undoable(text, line, want[line - 1], seen) for line in lines)
         row["mends"] = [f"{s.step}: {s.diff}" for s in found]
     return row
 
@@ -300,6 +306,7 @@ def main() -> None:
     search.Supervisor = InProcess
     search.time = SimpleNamespace(monotonic=time.process_time)  # other processes do not shorten a search
     warm()
+    warnings.filterwarnings("ignore", category=RuntimeWarning)
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -313,7 +320,7 @@ def main() -> None:
             row |= judged(bench, subject, truth, text, lines, options.search, options.limit)
             rows.append(row)
             print(number, robot, kinds, {k: v for k, v in row.items() if isinstance(v, bool)}, flush=True)
-            if not all(v for v in row.values() if isinstance(v, bool)):
+            if not all(v for k, v in row.items() if isinstance(v, bool) and k not in ("undoable", "undone")):
                 was, now = bench.text.splitlines(), text.splitlines()
                 row["planted"] = [(now[line - 1].strip(), was[line - 1].strip()) for line in lines]
                 print("   ", row["planted"], row["findings"], row.get("mends"), flush=True)
@@ -324,18 +331,28 @@ def main() -> None:
 
 
 def summary(rows: list[dict]) -> None:
-    """Print figures by kind of mistake."""
-    keys = [k for k in ("noticed", "joint_and_part", "parameter", "undone", "complete") if k in rows[0]]
+    """Print figures by kind of mistake, by formula, and the misses."""
+    keys = [k for k in ("noticed", "joint_and_part", "parameter", "complete", "mended", "undone") if k in rows[0]]
     kinds = Counter(kind for row in rows for kind in row["kinds"])
-    print(f"{'kind':30} {'n':>4} " + " ".join(f"{key:>15}" for key in keys))
-    for kind in [*kinds, "all"]:
-        mine = [row for row in rows if kind == "all" or kind in row["kinds"]]
+    robots = Counter(row["robot"] for row in rows)
+    print(f"{'kind':30} {'n':>4} " + " ".join(f"{key:>15}" for key in keys) + "   mended of undoable")
+    for kind in [*kinds, *robots, "all"]:
+        mine = [row for row in rows if kind in ("all", row["robot"]) or kind in row["kinds"]]
         shares = [100 * sum(row[key] for row in mine) / len(mine) for key in keys]
-        print(f"{kind:30} {len(mine):4} " + " ".join(f"{share:13.1f} %" for share in shares))
+        could = [row for row in mine if row.get("undoable")]
+        print(
+            f"{kind:30} {len(mine):4} "
+            + " ".join(f"{share:13.1f} %" for share in shares)
+            + (f"   {sum(row['mended'] for row in could)} of {len(could)}" if could else "")
+        )
     for key in ("seconds_findings", "seconds_search"):
         if key in rows[0]:
             times = sorted(row[key] for row in rows)
             print(f"{key}: median {times[len(times) // 2]:.2f}, longest {times[-1]:.2f}")
+    for row in rows:
+        if "planted" in row:
+            what = [key for key in keys if not row[key]]
+            print(f"missed ({', '.join(what)}; undoable: {row.get('undoable')}): {row['robot']} {row['planted']}")
 
 
 if __name__ == "__main__":

@@ -35,6 +35,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "foreign",
         "hints",
         "metrics",
+        "demand",
         "dry_friction",
         "staging",
         "compiled",

@@ -15,12 +15,13 @@ import workbench as wb
 from small_campaign import Workbench
 from workbench.diagnosis.entries import WRONG_MARK, Entry, floors_of, ratio_of, simple
 from workbench.diagnosis.examine import diagnose_subject
+from workbench.diagnosis.paper import lines_run, make_paper, splitting_of
 from workbench.diagnosis.parts import INERTIA, VELOCITY, WEIGHT, Part, take_apart
 from workbench.diagnosis.probes import ask, choose_poses, make_plan
 from workbench.diagnosis.result import Diagnosis
-from workbench.diagnosis.search import lines_run, make_paper, search_mends, splitting_of
+from workbench.diagnosis.search import search_mends
 from workbench.diagnosis.surface import subjects, write_mended
-from workbench.diagnosis.trial import Setup, code_of
+from workbench.diagnosis.trial import FIRST, Setup, Task, code_of
 
 EXAMPLES = ("delta", "fourbar", "fivebar", "bricard", "orthoglide")
 
@@ -214,8 +215,8 @@ def test_an_edit_that_mends_everything_scores_complete(repository: Path, tmp_pat
     wrong = path.read_text()
     right = (repository / "examples" / "delta" / "delta.py").read_text()
     work = Setup(paper)()
-    before, after, broken = work(([wrong, right, "def broken(:"], None))
-    endless = work((["while True: pass"], 1))[0]
+    before, after, broken = work(Task((wrong, right, "def broken(:")))
+    endless = work(Task(("while True: pass",), FIRST))[0]
     assert before is not None
     assert after is not None
     assert after.complete
@@ -327,17 +328,17 @@ def test_apply_writes_a_copy_that_is_right_and_never_the_file_itself(
 
 
 def test_an_iteration_that_does_not_converge_is_said_first(repository: Path, tmp_path: Path) -> None:
-    home = repository / "benchmarks" / "rrr"
+    home = repository / "examples" / "rrr"
     text = (home / "rrr.py").read_text(encoding="utf-8")
     path = tmp_path / "rrr.py"
-    path.write_text(text.replace("- p.l2**2", "+ p.l2**2"), encoding="utf-8")
-    found = diagnosed(home / "rrr.toml", path)
+    path.write_text(text.replace("- p.l2**2)", "+ p.l2**2)"), encoding="utf-8")
+    found = diagnosed(home / "rrr.toml", path, "exact")
     first = found.findings[0]
     assert first.kind == "kinematics"
     assert "does not converge" in " ".join([first.sentence, *found.not_covered])
     assert ("weight", "q1") in wrong_entries(found)
     path.write_text(text, encoding="utf-8")
-    assert diagnosed(home / "rrr.toml", path).right
+    assert diagnosed(home / "rrr.toml", path, "exact").right
 
 
 def test_a_wrong_mass_is_named_through_single_precision(repository: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 from pydantic import BaseModel
 
 import workbench as wb
+from workbench.robots.actuators import ActuatorSpec
 from workbench.robots.places import KINDS
 from workbench.robots.robot_file import BarSpec, ParameterSpec, PlatformSpec, RobotSpec
 
@@ -18,6 +19,7 @@ SECTIONS: dict[str, type[BaseModel]] = {
     "### `[platform]`": PlatformSpec,
     "### `[parameters.NAME]`": ParameterSpec,
     "### `[[bars]]`": BarSpec,
+    "### `[actuators.JOINT]`": ActuatorSpec,
 }
 
 

@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from workbench.campaign.actuators import answer, shortfalls
 from workbench.campaign.changed import ANOTHER, Change, sentences
 from workbench.campaign.compare import Row
 from workbench.campaign.conclusion import (
@@ -25,6 +26,8 @@ from workbench.campaign.conclusion import (
     UNDECIDED_RUN,
     Conclusion,
 )
+from workbench.campaign.good import NO, WORDS, YES, answers, good_enough
+from workbench.campaign.good import UNDECIDED as UNDECIDED_ANSWER
 from workbench.campaign.not_driven import NOT_DRIVEN
 from workbench.campaign.run import Outcome
 from workbench.campaign.verdict import (
@@ -75,6 +78,10 @@ CONCLUSIONS = {
     NOTHING_JUDGED: "bold cyan",
 }  # fmt: skip
 """Colour of each verdict on a run: green where every bound holds, and nowhere else."""
+
+
+ANSWERS = {NO: "bold yellow", UNDECIDED_ANSWER: "magenta", YES: "green"}
+"""Colour of each answer to "is it good enough"; a row shows the first of them that one of its joints has."""
 
 
 class _Bar:
@@ -153,7 +160,7 @@ def print_outcome(outcome: Outcome) -> None:
     for kind, title, show in tables:
         rows = [row for row in outcome.rows if row.kind == kind]
         if rows:
-            out.print(_table(title, rows, manifest["joints"], show))
+            out.print(_table(title, rows, manifest["joints"], show, manifest["good"]))
         if kind == RECORDED and rows:
             _print_recorded(manifest)
     out.print(Text("Each error is max|tau - tau_ref| / max|tau_ref| of that joint over the case."), style="dim")
@@ -163,6 +170,7 @@ def print_outcome(outcome: Outcome) -> None:
             out.print(Text(f"cannot be driven: {case['message']}", style="yellow"), soft_wrap=True)
         for warning in case["warnings"]:
             out.print(Text(f'warning: case "{name}": {warning}'), style="yellow")
+    _print_attention(outcome)
     refuted = [claim for claim in manifest["claims"] if claim["holds"] is False]
     if manifest["claims"]:
         held = sum(claim["holds"] is True for claim in manifest["claims"])
@@ -177,6 +185,21 @@ def print_outcome(outcome: Outcome) -> None:
     _print_diagnosis(manifest.get("diagnosis", {}))
     print_conclusion(outcome.conclusion)
     out.print(Text(f"Report: {outcome.directory / 'report.html'}"), soft_wrap=True)
+
+
+def _print_attention(outcome: Outcome) -> None:
+    """Print what changes no verdict and still has to be looked at: accuracy that was asked for, actuators too small."""
+    unknown = [name for name, case in outcome.manifest["cases"].items() if case["status"] == NOT_DRIVEN]
+    for found in answers(outcome.rows, outcome.manifest["good"], unknown):
+        out.print(Text(found.sentence, style=ANSWERS[found.answer]), soft_wrap=True)
+    held = outcome.margins
+    small = shortfalls(held)
+    if small:
+        out.print(Text("Needs attention (no failure of a formula; the verdict stands):", style="bold yellow"))
+    for sentence in small:
+        out.print(Text(f"  {sentence}", style="yellow"), soft_wrap=True)
+    if held and not small:
+        out.print(Text(answer(held, unknown)), soft_wrap=True)
 
 
 def _print_recorded(manifest: dict[str, Any]) -> None:
@@ -238,17 +261,19 @@ def print_conclusion(found: Conclusion) -> None:
     out.print(Text(found.text, style=CONCLUSIONS[found.status]), soft_wrap=True)
 
 
-def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any) -> Table:
+def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any, good: float | None = None) -> Table:
     """One line per case and candidate; where that is wider than the terminal, cases stand on lines of their own."""
     names = tuple(joints)
-    beside = _laid_out(title, rows, names, show, case_above=False)
+    beside = _laid_out(title, rows, names, show, good, case_above=False)
     unbounded = out.options.update(max_width=1000)
     if out.measure(beside, options=unbounded).maximum <= out.width:
         return beside
-    return _laid_out(title, rows, names, show, case_above=True)
+    return _laid_out(title, rows, names, show, good, case_above=True)
 
 
-def _laid_out(title: str, rows: list[Row], joints: Iterable[str], show: Any, *, case_above: bool) -> Table:
+def _laid_out(
+    title: str, rows: list[Row], joints: Iterable[str], show: Any, good: float | None, *, case_above: bool
+) -> Table:
     bounds = {row.bound for row in rows if row.bound is not None}
     if len(bounds) == 1:
         title += f"; bound {next(iter(bounds)):.0e}"
@@ -271,10 +296,15 @@ def _laid_out(title: str, rows: list[Row], joints: Iterable[str], show: Any, *, 
             cells.insert(0, Text(case if case != previous else ""))
         elif case != previous:
             table.add_row(Text(case))
-        cells += [Text(show(r.peak_error), style="red" if r.verdict in FAILURES else "") for r in members]
+        said = {good_enough(r, good) for r in members} - {""}
+        if said:  # asked for: the answer takes the place of a word that says nothing
+            verdict = next(a for a in ANSWERS if a in said)
+        bad = [r.verdict in FAILURES or good_enough(r, good) == NO for r in members]
+        cells += [Text(show(r.peak_error), style="red" if b else "") for r, b in zip(members, bad, strict=True)]
         if len(bounds) > 1:
             cells.append(Text("" if members[0].bound is None else f"{members[0].bound:.0e}"))
-        table.add_row(*cells, Text(verdict, style=STYLES[verdict]))
+        word, style = (WORDS[verdict], ANSWERS[verdict]) if said else (verdict, STYLES[verdict])
+        table.add_row(*cells, Text(word, style=style))
         previous = case
     return table
 

@@ -25,6 +25,7 @@ from workbench.errors import MotionError, SpecError, WorkbenchError, did_you_mea
 from workbench.motion import JointMotion, PlatformMotion
 from workbench.recorded.read import Record
 from workbench.reference.replay import motion_through
+from workbench.robots.actuators import check_joints
 from workbench.robots.assignments import resolve_changes
 from workbench.robots.catalogue import bundled_robot, bundled_robots
 from workbench.robots.robot_file import FILE, RobotFile, read_robot_file
@@ -88,6 +89,7 @@ def resolve_cases(
         One line that names the case and, for motions, the time and the joint.
     """
     base, path = base_robot(campaign, file, model, users)
+    check_joints(campaign.actuators or {}, base.joints, str(file))
     names = [case.name for case in campaign.case]
     for name in only:
         if name not in names:
@@ -107,6 +109,7 @@ def resolve_cases(
         if only and spec.name not in only:
             continue
         overrides: dict[str, float] = {}
+        robot = None
         try:
             overrides = table.layered(campaign.parameters, spec.parameters, settings or {})
             if relative:
@@ -124,7 +127,7 @@ def resolve_cases(
             named = _in_case(error, file, spec.name)
             if left_out is None or not isinstance(named, MotionError):
                 raise named from error
-            left_out(NotDriven(spec, named, overrides))
+            left_out(NotDriven(spec, named, overrides, robot))
     return cases
 
 

@@ -66,6 +66,11 @@ def few(said: Sequence[str]) -> str:
     return ", ".join(said[:SHOWN]) + more
 
 
+def not_known(cases: Sequence[str]) -> str:
+    """Say that nothing is known of *cases*, a sentence with a blank in front; empty where there are none."""
+    return f" Nothing is known of {few(list(cases))}: not computed." if cases else ""
+
+
 def among(cases: Sequence[str], every: Sequence[str]) -> str:
     """Say which of *every* case something concerns, in as few names as it takes: `` in a``, `` in all cases but b``."""
     others = [case for case in every if case not in cases]

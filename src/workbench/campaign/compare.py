@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.campaign.actuators import demand_facts
 from workbench.campaign.candidate_spec import CandidateSpec
 from workbench.campaign.cases import Case, at_time
 from workbench.campaign.evidence import FULL, Effort, Evidence, gather_evidence
@@ -146,7 +147,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     series["closure_residual"] = first.closure_residual
     facts = _facts(case, first, rows, platform) | {"evidence": evidence.facts()}
     if effort.described:
-        facts |= _description(case, reference, first)
+        facts |= _description(case, reference, first) | {"demand": demand_facts(case, results)}
     if recorded:
         facts["recorded"] = {found.spec.label: found.facts for found in recorded}
     facts["warnings"] = [*facts["warnings"], *hints, *left]

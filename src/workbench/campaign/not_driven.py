@@ -30,6 +30,8 @@ class NotDriven:
     spec: CaseSpec
     error: MotionError
     parameters: Mapping[str, float]
+    robot: Robot | None = None
+    """None where it could not be made"""
 
     def facts(self) -> dict[str, Any]:
         """What the manifest says of it."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.campaign import store
+from workbench.campaign.actuators import Margin, limits_of, margins_of_facts
 from workbench.campaign.cases import Case, resolve_cases, with_unit_hint
 from workbench.campaign.changes import IN_CAMPAIGN, Changes, Variant, changes_of
 from workbench.campaign.claims import judge_claims
@@ -20,6 +21,7 @@ from workbench.campaign.conclusion import CaseOutcome, Conclusion, case_status, 
 from workbench.campaign.cost import cost_us
 from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.figure_spec import FigureSpec
+from workbench.campaign.good import check_asked, with_good
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
 from workbench.campaign.not_driven import NotDriven
@@ -27,6 +29,7 @@ from workbench.campaign.replacing import refuse_loss, request_of
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.campaign.user_candidates import Formula, UserCandidate, load_candidates, with_rows
 from workbench.campaign.verdict import FAIL, VERIFICATION
+from workbench.capabilities.robot import Robot
 from workbench.errors import MotionError, OutputError, SpecError, WorkbenchError
 from workbench.staging import check_output, staged
 
@@ -39,6 +42,11 @@ class Outcome:
     conclusion: Conclusion
     rows: list[Row]
     manifest: dict[str, Any]
+
+    @property
+    def margins(self) -> list[Margin]:
+        """Every case held against every limit of an actuator; empty where nobody gave limits."""
+        return margins_of_facts(self.manifest)
 
     @property
     def passed(self) -> bool:
@@ -88,6 +96,7 @@ def run_campaign(
     explain: Explain | None = None,
     keep_going: bool = False,
     replace: bool = False,
+    good: float | None = None,
 ) -> Outcome:
     """Run a campaign and write its run directory.
 
@@ -125,6 +134,8 @@ def run_campaign(
         Record cases that cannot be driven, each with the nearest pose that can, and compute the others.
     replace
         Put the run in the place of an earlier one that holds what this one does not: other cases, another robot.
+    good
+        Wanted accuracy of formulas without a bound, in place of the campaign's: a fraction, 0.02 is 2 %.
 
     Raises
     ------
@@ -141,7 +152,7 @@ def run_campaign(
     )
     users = load_candidates(candidates)
     own = {candidate.name for candidate in campaign.candidate}
-    campaign = with_rows(campaign, users)
+    campaign = with_good(with_rows(campaign, users), good)
     if campaign.sweep:
         if not only or pick is None:
             raise SpecError(f"{file}: has a sweep; workbench.sweep.run.run_sweep runs it")
@@ -152,9 +163,15 @@ def run_campaign(
         names = [case.name for case in campaign.case if not only or case.name in only]
         refuse_loss(directory, campaign.name, request, names, {candidate.name for candidate in campaign.candidate})
     check_engines(effort.engines)
+    check_asked(campaign, str(file))
     missing: list[NotDriven] = []
     left_out = missing.append if keep_going else None
-    cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users, left_out)
+    try:
+        cases = resolve_cases(campaign, file, model, tuple(only), settings, relative, users, left_out)
+    except MotionError as error:
+        alone = len(only or campaign.case) == 1
+        hint = "" if alone else "; --keep-going (keep_going=True) records such cases and computes the others"
+        raise MotionError(f"{error}{hint}", **error.facts) from error
     _refuse_none(cases, missing)
     results: list[CaseResult] = []
     with (
@@ -170,7 +187,7 @@ def run_campaign(
             except MotionError as error:
                 if not keep_going:
                     raise
-                missing.append(NotDriven(case.spec, error, case.overrides))
+                missing.append(NotDriven(case.spec, error, case.overrides, case.robot))
                 continue
             results.append(result)
             store.write_series(stage, case.name, result.series)
@@ -185,9 +202,12 @@ def run_campaign(
         found = {result.name: _judged(result) for result in results} | {m.spec.name: m.facts() for m in missing}
         facts = {case.name: found[case.name] for case in campaign.case if case.name in found}
         conclusion = conclude(rows, {name: _outcome(said) for name, said in facts.items()})
-        variants = [Variant(case.name, case.robot, case.spec.parameters) for case in cases]
+        robots = {case.name: case.robot for case in cases}
+        robots |= {one.spec.name: one.robot for one in missing if one.robot is not None}
+        ordered = [spec for spec in campaign.case if spec.name in robots]
+        variants = [Variant(spec.name, robots[spec.name], spec.parameters) for spec in ordered]
         changes = changes_of(campaign, file, model, settings or {}, relative, variants)
-        manifest = _manifest(campaign, file, cases, facts, rows, changes, own) | {
+        manifest = _manifest(campaign, file, cases, robots, facts, rows, changes, own) | {
             "command": shlex.join(command),
             "request": request,
             "started": started.isoformat(timespec="seconds"),
@@ -197,10 +217,12 @@ def run_campaign(
             "verdict": conclusion.sentence,
             "engines": list(effort.engines),
             "budget": effort.budget,
+            "good": campaign.good,
         }
         if explain:
             manifest["diagnosis"] = _explained(cases, rows, path, candidates, explain)
-        store.write_summary(stage, rows, [case.name for case in cases if changes.why_not(case.name)])
+        changed = [case.name for case in cases if changes.why_not(case.name)]
+        store.write_summary(stage, rows, changed, campaign.good)
         store.write_manifest(stage, manifest)
         if pictures:
             pictures.finish(stage)
@@ -289,6 +311,7 @@ def _manifest(
     campaign: Campaign,
     file: Path,
     cases: list[Case],
+    robots: Mapping[str, Robot],
     facts: Mapping[str, Mapping[str, Any]],
     rows: list[Row],
     changes: Changes,
@@ -310,7 +333,8 @@ def _manifest(
             for name, c in candidates.items()
         }
         | ({RAW_INVERSE: RAW_DESCRIPTION} if any(row.candidate == RAW_INVERSE for row in rows) else {}),
-        "claims": judge_claims(campaign, own, rows, facts, {case.name: case.robot for case in cases}, changes),
+        "claims": judge_claims(campaign, own, rows, facts, robots, changes),
         "figures": [_figure(kept, changes) for figure in campaign.figure if (kept := figure.among(computed))],
+        "actuators": limits_of(campaign, robot, str(file)),
         "cases": dict(facts),
     }

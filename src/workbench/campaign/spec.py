@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, field_validator, model_validator
 
 from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
@@ -20,6 +20,7 @@ from workbench.campaign.sweep_spec import Filter, SweepSpec, Vary
 from workbench.data_files import bundled, bundled_names
 from workbench.documents import Form, read_toml, shorten
 from workbench.errors import SpecError, WorkbenchError, did_you_mean
+from workbench.robots.actuators import ActuatorSpec
 from workbench.schema import Finite, Name, Strict, Triple
 
 FORMAT = 1
@@ -30,6 +31,18 @@ def no_boolean(value: object) -> object:
     if isinstance(value, bool):
         raise ValueError("should be a number")
     return value
+
+
+def check_fraction(good: float) -> None:
+    """Refuse what is no accuracy as a fraction.
+
+    Raises
+    ------
+    ValueError
+        Percent where a fraction is meant.
+    """
+    if not 0.0 < good < 1.0:
+        raise ValueError("should be a fraction between 0 and 1; 0.02 is 2 %")
 
 
 class ReplayWindow(Strict):
@@ -109,6 +122,17 @@ class Campaign(RobotKeys):
     claim: list[ClaimSpec] = Field(default_factory=list)
     figure: list[FigureSpec] = Field(default_factory=list)
     sweep: SweepSpec | None = None
+    good: Annotated[Finite, Field(gt=0)] | None = None
+    """wanted accuracy of formulas without a bound: largest `peak_error`, a fraction; a sweep has ``sweep.good``"""
+    actuators: dict[str, ActuatorSpec] | None = None
+    """what the actuators can give, by joint, over what the robot file says"""
+
+    @field_validator("good")
+    @classmethod
+    def _fraction(cls, value: float | None) -> float | None:
+        if value is not None:
+            check_fraction(value)
+        return value
 
     @model_validator(mode="after")
     def _one_case_varies(self) -> Campaign:
@@ -116,6 +140,8 @@ class Campaign(RobotKeys):
             raise ValueError(
                 "a campaign with a sweep has one case, which varies; no claims, no figures, no recorded torques"
             )
+        if self.sweep and (self.good is not None or self.actuators):
+            raise ValueError("a campaign with a sweep has sweep.good in place of good, and no actuators")
         return self
 
 
@@ -175,6 +201,7 @@ FORM = Form(
     sections={
         "candidate": CandidateSpec, "case": CaseSpec, "claim": ClaimSpec, "figure": FigureSpec, "measure": Measure,
         "recorded": RecordedSpec, "sweep": SweepSpec, "vary": Vary, "filter": Filter, "printed_cost": PrintedCost,
+        "actuators": ActuatorSpec,
     },
     kinds=MOTIONS,
     kinds_of="motion",

@@ -16,6 +16,7 @@ import pandas as pd
 
 from workbench.arrays import FloatArray
 from workbench.campaign.compare import Row
+from workbench.campaign.good import good_enough
 from workbench.staging import DirectoryKind
 
 FORMAT = 1
@@ -41,13 +42,15 @@ def write_series(stage: Path, case: str, columns: Mapping[str, FloatArray]) -> N
     (folder / f"{case}.parquet").write_bytes(content)
 
 
-def write_summary(stage: Path, rows: list[Row], changed: Collection[str] = ()) -> None:
+def write_summary(stage: Path, rows: list[Row], changed: Collection[str] = (), good: float | None = None) -> None:
     """Write ``summary.csv``; floats in their shortest form that reads back bit-equal.
 
-    *changed* names the cases whose robot is not the one that the campaign's claims and sources are about.
+    *changed* names the cases whose robot is not the one that the campaign's claims and sources are about; *good*
+    is the accuracy that is wanted of formulas without a bound.
     """
     frame = pd.DataFrame([dataclasses.asdict(row) for row in rows], columns=[f.name for f in dataclasses.fields(Row)])
     frame["robot"] = ["changed" if row.case in changed else "published" for row in rows]
+    frame["good_enough"] = [good_enough(row, good) for row in rows]
     frame.to_csv(stage / SUMMARY, index=False, lineterminator="\n")
 
 

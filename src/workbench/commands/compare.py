@@ -1,24 +1,32 @@
-"""``workbench compare``: two runs side by side."""
+"""``workbench compare``: two runs side by side, on the terminal and as a page."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
-    from workbench.compare.runs import Difference
+    from workbench.compare.asked import Asked
+    from workbench.compare.outcome import ComparisonOutcome
+    from workbench.compare.runs import Difference, RunComparison
+    from workbench.report.load import Run
 
-WORSE = 1
-NOTHING_COMPARED = 4
 LONGEST_VALUE = 26
 """Characters of a value that a table shows."""
 
 
 def compare(
-    run_a: Annotated[Path, typer.Argument(metavar="RUN_A", help="Run directory, the one before.")],
+    run_a: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN_A",
+            help="Run directory, the one before; or a campaign, which is computed now as it stands.",
+        ),
+    ],
     run_b: Annotated[Path, typer.Argument(metavar="RUN_B", help="Run directory, the one after.")],
     factor: Annotated[
         float, typer.Option(metavar="X", help="An error that grew by more than this factor is worse.")
@@ -26,24 +34,41 @@ def compare(
     floor: Annotated[
         float, typer.Option(metavar="ERROR", help="Errors below this are rounding, and count as equal to it.")
     ] = 1e-12,
+    html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the comparison as a page.")] = None,
+    good: Annotated[
+        float | None,
+        typer.Option(metavar="FRACTION", help="Wanted accuracy of formulas without a bound in both runs; 0.02 is 2 %."),
+    ] = None,
 ) -> None:
-    """Say what changed from one run to another: parameters, versions, campaign, and every error.
+    """Say what changed from one run to another: parameters, what it asks of motors and joints, and every error.
 
     Exit code 0: nothing got worse; 1: an error grew by more than the factor, or a verdict turned; 2: bad input; 4: the
     runs have no error in common, so nothing is compared.
     """
     from rich.text import Text
 
+    from workbench.campaign.good import refuse_no_fraction
+    from workbench.commands.before import run_before
     from workbench.commands.change_table import LEGEND, change_table
-    from workbench.compare.errors import all_worse
-    from workbench.compare.runs import compare_runs
+    from workbench.compare.outcome import NOTHING, WORSE, outcome_of
+    from workbench.compare.runs import compare_loaded
     from workbench.console import out
+    from workbench.output_file import refuse_target
+    from workbench.report.load import load_run
+    from workbench.sweep.files import write_bytes
 
-    found = compare_runs(run_a, run_b)
-    worse = all_worse(found.errors, factor, floor)
+    refuse_no_fraction(good)
+    if html is not None:
+        refuse_target(html)
+    new = load_run(run_b)
+    with run_before(run_a, new.manifest) as old:
+        found = compare_loaded(old, new, good)
+        outcome = outcome_of(found, factor, floor)
+        page = _page(html, (run_a, run_b), (old, new), found, outcome, floor)
     out.print(Text(f"A: {run_a}\nB: {run_b}"), soft_wrap=True)
     _print_differences("Inputs", found.inputs)
     _print_differences("Outcomes", found.outcomes)
+    _print_asked(found)
     changed = [change for change in found.errors if not change.same]
     equal = len(found.errors) - len(changed)
     shared = {change.case for change in found.errors if change.after is not None}
@@ -54,17 +79,75 @@ def compare(
         out.print(Text(LEGEND, style="dim"))
     if equal:
         out.print(Text(f"{equal} of {len(found.errors)} errors are the same, bit for bit."))
-    for line in worse:
+    for line in outcome.worse:
         out.print(Text(f"worse: {line}", style="red"), soft_wrap=True)
-    if worse:
-        out.print(Text(f"WORSE: {len(worse)} by more than a factor of {factor:g}, or by verdict.", style="bold red"))
-        raise typer.Exit(WORSE)
-    if not found.shared:
-        out.print(Text("NOTHING COMPARED: the runs have no error in common.", style="bold cyan"))
-        raise typer.Exit(NOTHING_COMPARED)
-    alone = sum(change.before is None or change.after is None for change in found.errors)
-    rest = f"; {alone} errors in one run only" if alone else ""
-    out.print(Text(f"OK: nothing got worse by more than a factor of {factor:g}{rest}.", style="bold green"))
+    for line in outcome.good:
+        out.print(Text(line, style="bold" if line.startswith("B") else ""), soft_wrap=True)
+    for line in outcome.small:
+        out.print(Text(f"needs attention: {line}", style="yellow"), soft_wrap=True)
+    if outcome.enough:
+        out.print(Text(outcome.enough), soft_wrap=True)
+    if html is not None:
+        write_bytes(html, page)
+        out.print(Text(f"Page: {html}"), soft_wrap=True)
+    style = {WORSE: "bold red", NOTHING: "bold cyan"}.get(outcome.key, "bold green")
+    out.print(Text(outcome.text, style=style), soft_wrap=True)
+    if outcome.exit_code:
+        raise typer.Exit(outcome.exit_code)
+
+
+def _page(
+    html: Path | None,
+    paths: tuple[Path, Path],
+    runs: tuple[Run, Run],
+    found: RunComparison,
+    outcome: ComparisonOutcome,
+    floor: float,
+) -> bytes:
+    if html is None:
+        return b""
+    from workbench.compare.page import comparison_page
+
+    return comparison_page(*runs, (str(paths[0]), str(paths[1])), found, outcome, floor).encode()
+
+
+def _print_asked(found: RunComparison) -> None:
+    """Print the largest force, speed, power and work of each actuator, where they changed."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from workbench.commands.change_table import NARROW
+    from workbench.compare.asked import WORDS, worst_over_cases
+    from workbench.compare.sections import ratio_text
+    from workbench.console import out
+
+    rows = [one for one in worst_over_cases([*found.demands, *_worst_reaction(found)]) if not one.same]
+    if not rows:
+        return
+    title = "What actuators have to give and joints to bear: the largest over the cases of both"
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), title=title, title_justify="left",
+                  title_style="bold", width=NARROW)  # fmt: skip
+    for column in ("", "figure", "A", "B", "B / A"):
+        table.add_column(column, overflow="fold", justify="left" if column in ("", "figure") else "right")
+    previous = ""
+    for one in rows:
+        first = one.item if one.item != previous else ""
+        figures = (_figure(value, one.unit) for value in (one.before, one.after))
+        table.add_row(*map(Text, (first, WORDS.get(one.key, one.key), *figures, ratio_text(one.ratio))))
+        previous = one.item
+    out.print(table)
+
+
+def _figure(value: float | None, unit: str) -> str:
+    return "-" if value is None else f"{value:.4g} {unit}"
+
+
+def _worst_reaction(found: RunComparison) -> list[Asked]:
+    """The reaction of the joint that bears most in the second run."""
+    sizes = {one.item: one.after for one in sorted(found.reactions, key=lambda one: one.after or 0.0)}
+    most = list(sizes)[-1:]
+    return [replace(one, item=f"joint {one.item}") for one in found.reactions if one.item in most]
 
 
 def _print_differences(title: str, found: Sequence[Difference]) -> None:

@@ -60,6 +60,13 @@ def run(
             help="Replace an earlier run of another robot, of other cases or candidates, once this is done.",
         ),
     ] = False,
+    good: Annotated[
+        float | None,
+        typer.Option(
+            metavar="FRACTION",
+            help="Wanted accuracy of formulas without a bound, 0.02 is 2 %: is lumped good enough? Judges nothing.",
+        ),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Workers of a sweep. Default: one per core.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Start a sweep over; drops what is finished.")] = False,
     retry_failed: Annotated[
@@ -80,6 +87,7 @@ def run(
     input; 4: nothing was held against a bound, so nothing is judged.
     """
     from workbench.campaign.evidence import Effort
+    from workbench.campaign.good import with_good
     from workbench.campaign.run import run_campaign
     from workbench.campaign.spec import campaign_names, load_campaign
     from workbench.commands.sweeps import dry_run as print_dry_run
@@ -97,6 +105,9 @@ def run(
     sweep = spec.sweep is not None and not only
     if relative and (sweep or dry_run):
         raise SpecError(f"{campaign}: --set NAME*=FACTOR does not go with {'--dry-run' if dry_run else 'a sweep'}")
+    if sweep and good is not None:
+        raise SpecError(f"{campaign}: --good {good:g}: a sweep counts its designs by sweep.good of the campaign")
+    spec = with_good(spec, good)
     if dry_run:
         print_dry_run(spec, file, model, values, effort, jobs, candidates or (), only or ())
         return
@@ -140,6 +151,7 @@ def run(
                 explain=brief,
                 keep_going=keep_going,
                 replace=replace,
+                good=good,
             )
         print_outcome(outcome)
         code = outcome.conclusion.exit_code

@@ -109,6 +109,10 @@ def dry_run(
     out.print(Text(f"  time: about {duration(found.seconds)} with {found.jobs} {workers}"))
     running = f", {size(found.bytes_while_running)} while it runs" if campaign.sweep and not only else ""
     out.print(Text(f"  disk: about {size(found.bytes_at_end)}{running}"))
+    if campaign.good is not None:
+        out.print(Text(f"  good: {100 * campaign.good:.3g} % is asked of {', '.join(found.measured)}"))
+    if found.limited:
+        out.print(Text(f"  actuators: limits of {', '.join(found.limited)} are held against every case"))
     if campaign.sweep and not only:
         parts = [f"{found.tried_filtered} left out by the filter", f"{found.tried_failed} not passed"]
         out.print(Text(f"  of {found.tried} cases tried: {', '.join(parts)}"))

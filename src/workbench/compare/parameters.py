@@ -3,31 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 from workbench.campaign.changed import among, few
+from workbench.compare.asked import shared_cases
 from workbench.report.manifest import Manifest
 from workbench.report.tables import NOT_COMPUTED
 
 Values = Mapping[str, float | None]
 
 
-def parameter_changes(old: Manifest, new: Manifest) -> Iterator[tuple[str, float | None, float | None]]:
-    """Yield names, with the cases where they are not all that both runs have, the value before and the value after.
+@dataclass(frozen=True)
+class ParameterChange:
+    """Parameters that changed alike, SI; None is a value that a run does not have."""
 
-    Parameters that changed alike stand together: ``a1_left, a1_right``. None is a value that a run does not have.
-    """
-    shared = [name for name in new.cases if name in old.cases]
+    names: tuple[str, ...]
+    before: float | None
+    after: float | None
+    where: str = ""
+    """`` in CASE, CASE`` where it does not concern all cases that both runs have computed"""
+    unit: str = ""
+    meaning: str = ""
+    by: str = ""
+    """by what the second run has another number than its robot's source: ``--set``"""
+
+    @property
+    def what(self) -> str:
+        """Names and cases in words."""
+        return f"{few(self.names)}{self.where}"
+
+
+def parameter_changes(old: Manifest, new: Manifest) -> Iterator[ParameterChange]:
+    """Yield what changed from one run's robots to the other's; parameters that changed alike stand together."""
+    shared = shared_cases(old, new)
     found: dict[tuple[str, float | None, float | None], list[str]] = {}
     for case in shared:
         before, after = _values(old, case), _values(new, case)
         for name in dict.fromkeys([*before, *after]):
             if before.get(name) != after.get(name):
                 found.setdefault((name, before.get(name), after.get(name)), []).append(case)
-    alike: dict[tuple[float | None, float | None, tuple[str, ...]], list[str]] = {}
+    listed = {one.name: one for one in (*old.parameters, *new.parameters)}
+    causes = {(one.name, one.after): one.by for one in new.changes.parameters}
+    alike: dict[tuple[float | None, float | None, tuple[str, ...], str, str, str], list[str]] = {}
     for (name, was, becomes), cases in found.items():
-        alike.setdefault((was, becomes, tuple(cases)), []).append(name)
-    for (was, becomes, concerned), names in alike.items():
-        yield f"{few(names)}{among(concerned, shared)}", was, becomes
+        known = listed.get(name)
+        told = (known.unit, known.meaning) if known else ("", "")
+        alike.setdefault((was, becomes, tuple(cases), *told, causes.get((name, becomes), "")), []).append(name)
+    for (was, becomes, concerned, unit, meaning, by), names in alike.items():
+        yield ParameterChange(tuple(names), was, becomes, among(concerned, shared), unit, meaning, by)
 
 
 def _values(manifest: Manifest, case: str) -> dict[str, float | None]:

@@ -9,12 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from workbench.campaign.actuators import Margin
 from workbench.campaign.changed import few
+from workbench.campaign.good import Answer, answers
+from workbench.compare.asked import Asked, demands, margins_of_both, reactions, shared_cases
 from workbench.compare.errors import ErrorChange, match_errors
 from workbench.compare.parameters import parameter_changes
 from workbench.report.concluded import conclusion_of
 from workbench.report.load import Run, load_run
 from workbench.report.manifest import ClaimRecord, Manifest
+from workbench.report.tables import NOT_COMPUTED
 
 MISSING = None
 """Stands for what a run does not have, as in JSON."""
@@ -25,8 +29,8 @@ LABELS = ("name", "id")
 CASE = re.compile(r'case ("[^"]*") (.+)')
 """What says something of one case."""
 
-PARAMETERS = re.compile(r'(case "[^"]*" )?parameters( |$)')
-"""What a campaign says of parameters: the robots' own values are compared instead."""
+PARAMETERS = re.compile(r'(case "[^"]*" )?parameters( |$)|(actuators|good)( |$)')
+"""What a campaign says of parameters, limits and accuracy: what holds in the run is compared instead."""
 
 PROSE = frozenset({"title", "description", "text", "note", "source"})
 """Keys of a campaign that say something and change nothing."""
@@ -52,6 +56,15 @@ class RunComparison:
     """verdict, status of cases, mobility, claims"""
     errors: tuple[ErrorChange, ...]
     joints: tuple[str, ...]
+    demands: tuple[Asked, ...] = ()
+    """what actuators have to give, by case, actuator and figure"""
+    reactions: tuple[Asked, ...] = ()
+    margins: tuple[tuple[Margin, ...], tuple[Margin, ...]] = ((), ())
+    """of both runs, against the same limits"""
+    answers: tuple[tuple[Answer, ...], tuple[Answer, ...]] = ((), ())
+    """of both runs, whether formulas without a bound keep the same wanted accuracy"""
+    apart: tuple[str, ...] = ()
+    """cases that not both runs have computed; only the others are compared"""
 
     @property
     def shared(self) -> int:
@@ -59,37 +72,58 @@ class RunComparison:
         return sum(change.before is not None and change.after is not None for change in self.errors)
 
 
-def compare_runs(before: Path, after: Path) -> RunComparison:
+def compare_runs(before: Path, after: Path, good: float | None = None) -> RunComparison:
     """Compare two run directories.
 
     Parameters
     ----------
     before, after
         Directories that ``workbench run`` wrote.
+    good
+        As `compare_loaded`.
 
     Raises
     ------
     OutputError
         One of them cannot be read; the message names file and key.
     """
-    old, new = load_run(before), load_run(after)
+    return compare_loaded(load_run(before), load_run(after), good)
+
+
+def compare_loaded(old: Run, new: Run, good: float | None = None) -> RunComparison:
+    """Compare two runs that are read.
+
+    Both are held against the same limits of actuators and the same wanted accuracy *good*: the second run's, or where
+    that has none, the first's.
+    """
+    shared = set(shared_cases(old.manifest, new.manifest))
+    apart = [name for name in dict.fromkeys([*old.manifest.cases, *new.manifest.cases]) if name not in shared]
+    wanted = good or new.manifest.good or old.manifest.good
+    both = [tuple(answers([row for row in run.rows if row.case in shared], wanted, apart)) for run in (old, new)]
+    limits = margins_of_both(old.manifest, new.manifest)
     return RunComparison(
         inputs=tuple(_inputs(old.manifest, new.manifest)),
         outcomes=(*_verdicts(old, new), *_once(_outcomes(old.manifest, new.manifest))),
         errors=tuple(match_errors(old.rows, new.rows)),
         joints=new.manifest.joints,
+        demands=tuple(demands(old.manifest, new.manifest)),
+        reactions=tuple(reactions(old.manifest, new.manifest)),
+        margins=(tuple(limits[0]), tuple(limits[1])),
+        answers=(both[0], both[1]),
+        apart=tuple(apart),
     )
 
 
 def _inputs(old: Manifest, new: Manifest) -> Iterator[Difference]:
     for key in ("mechanism", "file", "sha256"):
         yield from differences("model", key, getattr(old.model, key), getattr(new.model, key))
-    for what, before, after in parameter_changes(old, new):
-        yield Difference("parameter", what, before, after)
+    for change in parameter_changes(old, new):
+        yield Difference("parameter", change.what, change.before, change.after)
+    yield from differences("actuator", "", _limits(old), _limits(new))
     for group, field in (("version", "versions"), ("machine", "machine"), ("campaign", "spec")):
         found = differences(group, "", getattr(old, field), getattr(new, field))
         yield from _once(one for one in found if not PARAMETERS.search(one.what))
-    for field in ("campaign", "engines", "budget", "git_commit"):
+    for field in ("campaign", "engines", "budget", "good", "git_commit"):
         yield from differences("run", field.replace("_", " "), getattr(old, field), getattr(new, field))
 
 
@@ -113,6 +147,10 @@ def _once(found: Iterable[Difference]) -> Iterator[Difference]:
             )
 
 
+def _limits(manifest: Manifest) -> dict[str, Any]:
+    return {joint: limits.model_dump() for joint, limits in manifest.actuators.items()}
+
+
 def _verdicts(old: Run, new: Run) -> Iterator[Difference]:
     yield from differences("outcome", "verdict", *(conclusion_of(run).word for run in (old, new)))
 
@@ -123,7 +161,8 @@ def _outcomes(old: Manifest, new: Manifest) -> Iterator[Difference]:
         if one is None or two is None:
             yield Difference("outcome", f'case "{name}"', one and one.status, two and two.status)
             continue
-        for field in ("status", "mobility", "rank", "redundant_rows", "idle_freedoms"):
+        computed = not {one.status, two.status} & NOT_COMPUTED
+        for field in ("status", *(("mobility", "rank", "redundant_rows", "idle_freedoms") if computed else ())):
             yield from differences("outcome", f'case "{name}" {field}', getattr(one, field), getattr(two, field))
     claims = [{claim.id: _word(claim) for claim in manifest.claims} for manifest in (old, new)]
     yield from differences("outcome", "claim", *claims)

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+
+from workbench.diagnosis.places import Places
 
 SIGN, FACTOR, TRIG, INDEX, NAME, PARAMETER, EXPONENT, QUOTIENT, DROP = range(9)
 NEGATE, SCALE, SWAP, SQUARE, RARE_SCALE, INSERT = range(9, 15)
@@ -26,6 +28,9 @@ STAGES = (
     frozenset({SQUARE, RARE_SCALE}),
 )
 """Kinds in the order in which they are tried: the next only where those before mend nothing wholly."""
+
+LIKELY = STAGES[0] | {NEGATE, SQUARE}
+"""Kinds that are tried where one edit alone brings nothing."""
 
 SHAPES = frozenset(
     {"zeros", "ones", "eye", "empty", "arange", "linspace", "reshape", "range", "len", "tile", "repeat", "swapaxes",
@@ -56,43 +61,6 @@ class Edit:
         return (data[: self.start] + self.new.encode() + data[self.end :]).decode()
 
 
-@dataclass
-class _Places:
-    """Where nodes stand in the text."""
-
-    data: bytes
-    starts: list[int] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.starts = [0]
-        for line in self.data.splitlines(keepends=True):
-            self.starts.append(self.starts[-1] + len(line))
-
-    def start(self, node: ast.expr) -> int:
-        return self.starts[node.lineno - 1] + node.col_offset
-
-    def end(self, node: ast.expr) -> int:
-        assert node.end_lineno is not None
-        assert node.end_col_offset is not None
-        return self.starts[node.end_lineno - 1] + node.end_col_offset
-
-    def text(self, start: int, end: int) -> str:
-        return self.data[start:end].decode()
-
-    def operator(self, node: ast.BinOp) -> tuple[int, int]:
-        """Start and end of the operator between the operands, comments and brackets passed over."""
-        place, stop = self.end(node.left), self.start(node.right)
-        while place < stop:
-            char = self.data[place : place + 1]
-            if char == b"#":
-                place = self.data.index(b"\n", place)
-            elif char in b"+-*/@%":
-                size = 2 if self.data[place : place + 2] in (b"**", b"//") else 1
-                return place, place + size
-            place += 1
-        raise ValueError("no operator")
-
-
 def edits_of(
     text: str,
     lines: Iterable[int] | None,
@@ -121,7 +89,7 @@ def edits_of(
         The text is no Python.
     """
     tree = ast.parse(text)
-    walker = _Walker(_Places(text.encode()), set(lines) if lines is not None else None, groups, max(3, joints))
+    walker = _Walker(Places(text.encode()), set(lines) if lines is not None else None, groups, max(3, joints))
     walker.missing = missing
     walker.walk(tree)
     unique = {(e.start, e.end, e.new): e for e in sorted(walker.found, key=lambda e: -e.kind)}
@@ -130,7 +98,7 @@ def edits_of(
 
 class _Walker:
     def __init__(
-        self, places: _Places, lines: set[int] | None, groups: Mapping[str, Iterable[str]], indices: int
+        self, places: Places, lines: set[int] | None, groups: Mapping[str, Iterable[str]], indices: int
     ) -> None:
         self.places, self.lines, self.indices = places, lines, indices
         self.groups = {name: tuple(others) for name, others in groups.items()}
@@ -297,10 +265,9 @@ class _Walker:
         inner = f"({text})" if whole else text
         if not isinstance(node, ast.UnaryOp):
             self._replace(node, f"-{inner}", NEGATE)
-        for factor in ("2 * ", "0.5 * "):
-            self._replace(node, f"{factor}{inner}", SCALE)
-        for factor in ("4 * ", "0.25 * "):
-            self._replace(node, f"{factor}{inner}", RARE_SCALE)
+        for factor, kind in ((2, SCALE), (4, RARE_SCALE)):
+            self._replace(node, f"{factor} * {inner}", kind)
+            self._replace(node, f"{inner} / {factor}", kind)
 
     def _constant(self, node: ast.Constant) -> None:
         value = node.value
@@ -366,6 +333,7 @@ def _bound(function: ast.FunctionDef) -> dict[str, int]:
     for node in ast.walk(function):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             names[node.id] = min(names.get(node.id, node.lineno), node.lineno)
+    names.pop("_", None)  # nobody means it
     return names
 
 

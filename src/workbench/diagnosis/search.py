@@ -1,65 +1,45 @@
 """The search for a mend: small edits of the formula's source, tried one by one, the best taken further.
 
-A beam of a few sources, since a mistake in kinematics spoils everything and the first mend is then not yet a success.
+Each edit is looked at on the robot as it is, by running what it reaches again; those that get better are run as a file
+on all robots. Several sources are taken further, since a mistake in kinematics spoils everything and the first mend is
+then not yet a success; where none gets better, the least wrong are. Effects that add up are found without a run.
 Edits run in supervised workers, as sweeps do, each with a time limit; whatever they break, they break alone.
 """
 
 from __future__ import annotations
 
 import os
-import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
-from types import FrameType
-from typing import Any
 
 import numpy as np
 
-from workbench.arrays import FloatArray
-from workbench.diagnosis.edits import STAGES, WHAT, Edit, edits_of
+from workbench.diagnosis.combine import groups_alike, masks, sums
+from workbench.diagnosis.edits import LIKELY, STAGES, Edit, edits_of
 from workbench.diagnosis.examine import Examined
-from workbench.diagnosis.noise import SAFETY
-from workbench.diagnosis.parts import REST, Part, design, take_apart
-from workbench.diagnosis.probes import Plan, ask
+from workbench.diagnosis.inserts import inserts_of
+from workbench.diagnosis.nodes import Node, distinct, shifted
+from workbench.diagnosis.paper import groups_of, lines_run, make_paper, missing_in
 from workbench.diagnosis.result import Suggestion
-from workbench.diagnosis.shares import reference_torques
-from workbench.diagnosis.subject import AFFINE, Parameter, Subject
-from workbench.diagnosis.trial import Exam, Paper, Score, Setup
+from workbench.diagnosis.subject import Subject
+from workbench.diagnosis.suggestions import suggested
+from workbench.diagnosis.trial import FIRST, NOTHING, Paper, Score, Setup, Task, nothing_right
 from workbench.errors import WorkbenchError
 from workbench.sweep.supervisor import Lost, Supervisor
 
-POSES = 4
-SHARE_POSES = 2
 BEAM = 4
-FULL = 60
+FULL = 40
 """Edits that are looked at again with all parameters varied, for each step."""
 
+WHOLE = 400
+"""The same, of edits after which the robot as it is is right."""
+
+MOST_INSERTS = 8000
+
 STEPS = 6
-BATCH = 12
+BATCH = 24
 MEMORY_MB = 2000.0
-MOST_MENDS = 12
-
-
-@dataclass(frozen=True)
-class Node:
-    """An edited source and the way to it."""
-
-    text: str
-    score: Score
-    chain: tuple[tuple[Edit, str], ...] = ()
-    """edits so far, each with the text that it was made on"""
-
-    @property
-    def edit(self) -> Edit:
-        """The last edit."""
-        return self.chain[-1][0]
-
-    @property
-    def lines(self) -> set[int]:
-        """Lines that were edited, from 0."""
-        return {edit.place(on)[0] for edit, on in self.chain}
 
 
 def search_mends(
@@ -81,11 +61,11 @@ def search_mends(
         return [], (f"No edits are looked for: {source.file}: {error}.",)
     deadline = time.monotonic() + time_limit
     paper = make_paper(subject, seen)
-    lines = lines_run(subject, seen.plan)
-    groups = groups_of(subject.parameters)
+    lines, groups, missing = lines_run(subject, seen.plan), groups_of(subject.parameters), missing_in(seen)
     supervisor = Supervisor(jobs or _cores(), Setup(paper), 60.0, MEMORY_MB, 0)
     with closing(supervisor):
-        search = _Search(supervisor, deadline, lines, groups, len(subject.joints), missing_in(seen))
+        joints = len(subject.joints)
+        search = _Search(supervisor, paper, deadline, lambda text: edits_of(text, lines, groups, joints, missing))
         try:
             return search.run(text, str(source.file))
         except WorkbenchError as error:
@@ -98,255 +78,234 @@ def _cores() -> int:
 
 class _Search:
     def __init__(
-        self,
-        supervisor: Supervisor,
-        deadline: float,
-        lines: set[int] | None,
-        groups: dict[str, list[str]],
-        joints: int,
-        missing: frozenset[str],
+        self, supervisor: Supervisor, paper: Paper, deadline: float, edits: Callable[[str], list[Edit]]
     ) -> None:
-        self._missing = missing
-        self._supervisor, self._deadline = supervisor, deadline
-        self._lines, self._groups, self._joints = lines, groups, joints
+        self._supervisor, self._paper, self._deadline, self._edits = supervisor, paper, deadline, edits
         self._moves: dict[tuple[int, int, int, str], np.ndarray] = {}
+        self._looked: dict[str, list[Node]] = {}
+        self._run: set[str] = set()
         self.tried = 0
 
     def run(self, text: str, path: str) -> tuple[list[Suggestion], tuple[str, ...]]:
-        started = self._scores([text], None)[0]
-        if started is None:
-            return [], ("No edits are looked for: the file does not run in a worker.",)
-        root = Node(text, started)
-        best, waiting, others = root, [root], dict[str, list[Node]]()
-        while waiting and not best.score.complete and time.monotonic() < self._deadline:
-            # the best source first; one that led nowhere gives way to the next best
-            node = waiting.pop(0)
-            found = self._expand(node)
-            others[node.text] = found
-            if found and found[0].score.key > best.score.key:
-                best = found[0]
-            if len(node.chain) + 1 < STEPS:
-                gain = [n for n in _distinct(found) if n.score.key > node.score.key][:BEAM]
-                waiting = sorted([*waiting, *gain], key=lambda n: n.score.key, reverse=True)
+        started, whole = self.scores([text], FIRST)[0], self.scores([text], None)[0]
+        if started is None or whole is None:  # it fails at all of these states; an edit may mend that
+            started, whole = (nothing_right(self._paper, count) for count in (1, len(self._paper.exams)))
+        root = Node(text, started, whole=whole)
+        best = self._followed(root)
         notes = [f"{self.tried} edits tried."]
         if time.monotonic() > self._deadline:
             notes.append("The time was up before all were; --time SECONDS gives more.")
-        chain = _useful(root, best, others)
-        if not chain:
+        self._deadline = float("inf")  # what is shown is looked at thoroughly
+        found = suggested(root, best, self._looked, self._fill, path)
+        if not found:
             return [], (*notes, "None of them brings a part to round-off.")
-        if not chain[-1].score.complete:
+        if found[-1].left or not best.complete:
             notes.append("These mend a part of it; what is left is not among the edits that were tried.")
-        return list(_suggestions(root, chain, others, path)), tuple(notes)
+        return found, tuple(notes)
 
-    def _expand(self, node: Node) -> list[Node]:
-        """Score all edits of a source, and the promising ones thoroughly; best first."""
+    def _followed(self, root: Node) -> Node:
+        """The best source that is found in time."""
+        best, better, worse, filled = root, [root], list[Node](), set[str]()
+        seen = {root.text}
+        while (better or worse) and not best.complete and time.monotonic() < self._deadline:
+            # the best source first; one that led nowhere gives way to the next best, at last to the least wrong
+            climbing = bool(better)
+            if not climbing and best.text not in filled and best.text in self._looked:
+                node, climbing = best, True
+                filled.add(best.text)
+                found = self._inserted(best)
+            else:
+                node = better.pop(0) if climbing else worse.pop(0)
+                if node.whole is None:
+                    self._fill([node])
+                found = self._expand(node, climbing)
+            if found and _rank(found[0]) > _rank(best):
+                best = found[0]
+            if len(node.chain) + 1 >= STEPS:
+                continue
+            gain = [n for n in distinct(found) if n.text not in seen and _key(n) > _key(node if climbing else root)][
+                :BEAM
+            ]
+            seen |= {n.text for n in gain}
+            better = sorted([*better, *gain], key=_rank, reverse=True)
+            if node is root:
+                kept = [n for n in self._looked[node.text] if n.text not in seen and n.edit.kind in LIKELY]
+                worse = distinct_looks(sorted(kept, key=lambda n: n.look.key, reverse=True))
+        return best
+
+    def _expand(self, node: Node, thorough: bool) -> list[Node]:
+        """Look at all edits of a source, and at the promising ones on all exams; best first."""
         made: dict[str, Edit] = {}
-        wrong = ~node.score.base
-        for edit in edits_of(node.text, self._lines, self._groups, self._joints, self._missing):
+        wrong = ~node.look.base
+        for edit in self._edits(node.text):
             place = edit.place(node.text)
             moves = self._moves.get(place)
             # a mend moves nothing that is right; what an edit moves was seen when it was tried first
             if node.chain and moves is not None and place[0] not in node.lines and (moves & ~wrong).any():
                 continue
             made.setdefault(edit.apply(node.text), edit)
-        found: list[Node] = []
-        for stage in STAGES:
-            texts = [text for text, edit in made.items() if edit.kind in stage]
-            found += self._stage(node, texts, made)
-            if any(n.score.complete for n in found):
+        looked = self._looked[node.text] = []
+        for kinds in STAGES if thorough else (LIKELY,):
+            stage = self._look(node, [edit for edit in made.values() if edit.kind in kinds])
+            looked += stage
+            right = [n for n in stage if n.look.base.all()]
+            self._fill(self._telling(node, right)[:WHOLE])
+            if any(n.complete for n in right):
                 break
-        found.sort(key=lambda n: (n.score.complete, n.score.key, -n.edit.kind), reverse=True)
+        else:
+            looked = [*looked, *self._combined(node, looked)]
+        looked = sorted(looked, key=lambda n: n.look.key, reverse=True)
+        self._fill([n for n in looked if thorough or n.look.key > node.look.key][:FULL])
+        return sorted((n for n in looked if n.whole is not None), key=_rank, reverse=True)
+
+    def _inserted(self, node: Node) -> list[Node]:
+        """The same of terms and factors put into the statements whose edits move what is wrong."""
+        looked: list[Node] = []
+        for line in self._suspects(node):
+            stage = self._look(node, inserts_of(node.text, line))
+            looked += stage
+            right = [n for n in stage if n.look.base.all()]
+            self._fill(right[:FULL])
+            if any(n.complete for n in right) or len(looked) > MOST_INSERTS:
+                break
+        self._looked[node.text] += looked
+        self._fill(sorted((n for n in looked if n.look.key > node.look.key), key=_rank, reverse=True)[:FULL])
+        return sorted((n for n in looked if n.whole is not None), key=_rank, reverse=True)
+
+    def _suspects(self, node: Node) -> list[int]:
+        """Lines whose edits together move all that is wrong, those that move least of what is right first."""
+        wrong, moves = ~node.look.base, dict[int, np.ndarray]()
+        for looked in self._looked[node.text]:
+            moved = ~(np.abs(looked.look.found - node.look.found).max(axis=1) <= NOTHING * self._paper.floors)
+            moves[looked.edit.line] = moves.get(looked.edit.line, False) | moved
+        lines = [line for line, moved in moves.items() if not (wrong & ~moved).any()]
+        return sorted(lines, key=lambda line: (int((moves[line] & ~wrong).sum()), line))
+
+    def _telling(self, node: Node, nodes: list[Node]) -> list[Node]:
+        """Those that are right in the exam, too, that the source before is most wrong in."""
+        if node.whole is None or len(nodes) <= FULL:
+            return nodes
+        counts = (~node.whole.mask).reshape(node.whole.exams, -1).sum(axis=1)
+        exam = int(counts[1:].argmax()) + 1 if len(counts) > 1 else 0
+        scores = self.scores([n.text for n in nodes], (0, exam) if exam else FIRST)
+        return [n for n, score in zip(nodes, scores, strict=True) if score is not None and score.complete]
+
+    def _combined(self, node: Node, looked: list[Node]) -> list[Node]:
+        """Sources with two or three edits at once whose effects add up to what is wrong, of all joints or of one."""
+        floors = self._paper.floors
+        nodes = [n for n in looked if np.isfinite(n.look.found).all()]
+        start = node.look.found
+        if len(nodes) < 2 or not np.isfinite(start).all():
+            return []
+        effects = np.array([((n.look.found - start) / floors).ravel() for n in nodes])
+        wanted = ((self._paper.exams[0].parts - start) / floors).ravel()
+        groups = groups_alike(effects)
+        first = np.array([min(group, key=lambda i: (nodes[i].edit.kind, len(nodes[i].edit.new))) for group in groups])
+        made: dict[str, Node] = {}
+        for mask, triples in masks(start.shape):
+            small = effects[first][:, mask] if len(first) else np.zeros((0, 0))
+            moving = np.flatnonzero(np.abs(small).max(axis=1, initial=0.0) > 0.0)
+            for chosen in sums(small[moving], wanted[mask], triples):
+                numbers = [int(first[moving[i]]) for i in chosen]
+                joined = self._joined(node, [nodes[i] for i in numbers], nodes, groups)
+                if joined is not None:
+                    made.setdefault(joined.text, joined)
+            if any(n.look.base.all() for n in self._scored(made, FIRST)):
+                break
+        return self._scored(made, FIRST)
+
+    def _scored(self, made: dict[str, Node], exams: tuple[int, ...]) -> list[Node]:
+        """Those that run, with their looks."""
+        waiting = [n for n in made.values() if n.text not in self._run]
+        for n, score in zip(waiting, self.scores([n.text for n in waiting], exams), strict=True):
+            if score is None:
+                made.pop(n.text)
+            else:
+                n.look = score
+                self._run.add(n.text)
+        return list(made.values())
+
+    def _joined(self, node: Node, parts: list[Node], nodes: list[Node], groups: list[list[int]]) -> Node | None:
+        """One source with several edits, the one first that mends most alone."""
+        parts = sorted(parts, key=lambda n: n.look.key, reverse=True)
+        current, done = node, list[Edit]()
+        for part in parts:
+            edit: Edit | None = part.edit
+            for before in done:
+                edit = shifted(edit, before) if edit is not None else None
+            if edit is None:
+                return None
+            after = current.after(edit, part.look)
+            if current is not node:
+                group = next(g for g in groups if any(nodes[i] is part for i in g))
+                moved = [self._moved(nodes[i].edit, done) for i in group]
+                known = self._looked.setdefault(current.text, [])
+                known += [after, *(current.after(e, part.look) for e in moved if e is not None and e != edit)]
+            current = after
+            done.append(edit)
+        return current
+
+    @staticmethod
+    def _moved(edit: Edit, done: list[Edit]) -> Edit | None:
+        moved: Edit | None = edit
+        for before in done:
+            moved = shifted(moved, before) if moved is not None else None
+        return moved
+
+    def _look(self, node: Node, edits: list[Edit]) -> list[Node]:
+        found = []
+        batches = [tuple(edits[first : first + BATCH]) for first in range(0, len(edits), BATCH)]
+        answers = self._asked([Task((node.text,), FIRST, batch) for batch in batches])
+        for batch, answer in zip(batches, answers, strict=True):
+            for edit, score in zip(batch, answer or [None] * len(batch), strict=True):
+                if score is not None:
+                    found.append(node.after(edit, score))
+                    if not node.chain:
+                        self._moves[edit.place(node.text)] = score.moved
         return found
 
-    def _stage(self, node: Node, texts: list[str], made: dict[str, Edit]) -> list[Node]:
-        cheap = self._scores(texts, 1)
-        ranked = []
-        for text, score in zip(texts, cheap, strict=True):
-            if score is not None:
-                ranked.append((score.base.sum(), score.total, -made[text].kind, text))
-                if not node.chain:
-                    self._moves[made[text].place(node.text)] = score.moved
-        ranked.sort(reverse=True)
-        whole = [item[3] for item in ranked if item[0] == node.score.base.size]
-        kept, full = whole, self._scores(whole, None)
-        if not any(score is not None and score.complete for score in full):
-            others = [item[3] for item in ranked if item[0] != node.score.base.size][:FULL]
-            kept, full = whole + others, full + self._scores(others, None)
+    def _fill(self, nodes: Sequence[Node]) -> None:
+        """Run sources on all exams that have not been yet."""
+        waiting = [node for node in nodes if node.whole is None]
+        for node, score in zip(waiting, self.scores([n.text for n in waiting], None), strict=True):
+            node.whole = score
+
+    def scores(self, texts: Sequence[str], exams: tuple[int, ...] | None) -> list[Score | None]:
+        """Score texts in the workers, until the time is up; None for those that fail or are not reached."""
+        size = max(1, min(BATCH // 2, len(texts) // 4))
+        batches = [tuple(texts[first : first + size]) for first in range(0, len(texts), size)]
+        answers = self._asked([Task(batch, exams) for batch in batches])
         return [
-            Node(text, score, (*node.chain, (made[text], node.text)))
-            for text, score in zip(kept, full, strict=True)
-            if score is not None
+            score for batch, answer in zip(batches, answers, strict=True) for score in (answer or [None] * len(batch))
         ]
 
-    def _scores(self, texts: Sequence[str], exams: int | None) -> list[Score | None]:
-        """Score texts in the workers, until the time is up; None for those that fail or are not reached."""
-        found: list[Score | None] = [None] * len(texts)
+    def _asked(self, tasks: list[Task]) -> list[list[Score | None] | None]:
+        found: list[list[Score | None] | None] = [None] * len(tasks)
 
-        def tasks() -> Iterator[tuple[int, Any]]:
-            for first in range(0, len(texts), BATCH):
+        def timely() -> Iterator[tuple[int, Task]]:
+            for number, task in enumerate(tasks):
                 if time.monotonic() > self._deadline:
                     return
-                yield first, (texts[first : first + BATCH], exams)
+                yield number, task
 
-        for first, answer in self._supervisor.run(tasks()):
+        for number, answer in self._supervisor.run(timely()):
             if not isinstance(answer, Lost):
-                found[first : first + len(answer)] = answer
+                found[number] = answer
                 self.tried += len(answer)
         return found
 
 
-def _distinct(nodes: Iterable[Node]) -> list[Node]:
-    """One node of each effect."""
-    kept: list[Node] = []
-    for node in nodes:
-        if not any(node.score.like(other.score) for other in kept):
-            kept.append(node)
-    return kept
+def _key(node: Node) -> tuple[int, float]:
+    return (node.whole or node.look).key
 
 
-def _useful(root: Node, best: Node, others: dict[str, list[Node]]) -> list[Node]:
-    """The way to the best source, as far as each of its steps ends with more entries right and none broken."""
-    chain, before = [], root
-    for edit, on in best.chain:
-        text = edit.apply(on)
-        node = next(n for n in others[on] if n.text == text)
-        chain.append(node)
-        before = node
-    while chain and not chain[-1].score.complete:
-        earlier = chain[-2] if len(chain) > 1 else root
-        now, then = chain[-1].score, earlier.score
-        if now.right > then.right and not (then.mask & ~now.mask).any():
-            break
-        chain.pop()
-    return chain if before is not root else []
+def _rank(node: Node) -> tuple[bool, int, float, int, int]:
+    """For sorting: how right, and of what is as right the most usual and shortest edit."""
+    right, total = _key(node)
+    edit = (-node.edit.kind, -len(node.edit.new)) if node.chain else (0, 0)
+    return node.complete, right, round(total, 2), *edit
 
 
-def _suggestions(root: Node, chain: list[Node], others: dict[str, list[Node]], path: str) -> Iterator[Suggestion]:
-    """The way to the best source, and at each step the edits that do the same."""
-    before = root.score
-    for step, mine in enumerate(chain, start=1):
-        siblings = others[mine.chain[-1][1]]
-        alike = [mine, *(n for n in siblings if n.text != mine.text and n.score.like(mine.score))]
-        alike = [n for n in alike if n.score.complete == mine.score.complete]
-        alike.sort(key=lambda node: _rank(node.edit))
-        if step < len(chain):  # the way goes on from this one
-            alike.sort(key=lambda node: node.text != mine.text)
-        for node in alike[:MOST_MENDS]:
-            yield _suggestion(node, before, step, path)
-        before = mine.score
-
-
-def _rank(edit: Edit) -> tuple[int, int]:
-    return edit.kind, len(edit.new)
-
-
-def _suggestion(node: Node, before: Score, step: int, path: str) -> Suggestion:
-    edit, on = node.chain[-1]
-    line = on.encode()[: edit.start].count(b"\n") + 1
-    old, new = on.splitlines(), node.text.splitlines()
-    shown = [i for i in range(min(len(old), len(new))) if old[i] != new[i]]
-    first = shown[0] if shown else line - 1
-    return Suggestion(
-        file=os.path.basename(path),
-        line=first + 1,
-        before=old[first],
-        after=new[first],
-        what=WHAT[edit.kind],
-        mends=int((node.score.base & ~before.base).sum()),
-        left=int((~node.score.base).sum()),
-        step=step,
-        path=path,
-        text=node.text,
-    )
-
-
-def make_paper(subject: Subject, seen: Examined) -> Paper:
-    """Write down what an edited formula is asked: parts at a few poses, and each parameter's share at fewer."""
-    source = subject.source
-    assert source is not None
-    plan = seen.plan.at(POSES)
-    splitting = splitting_of(plan, subject.takes_force)
-    start, _ = ask(plan, lambda q, qd, qdd, force: subject.formula(q, qd, qdd, force, {}))
-    exams = [Exam(subject.values({}), plan.flat(), _parts(splitting, reference_torques(subject, plan, {})))]
-    few = seen.plan.at(SHARE_POSES)
-    changes = [{p.name: p.varied} for p in subject.parameters if p.read and p.kind in AFFINE]
-    lengths = [{p.name: p.varied} for p in subject.parameters if p.read and p.kind not in AFFINE]
-    for change in [*changes, *lengths]:
-        try:
-            tau = reference_torques(subject, few, change)
-            exams.append(Exam(subject.values(change), few.flat(), _parts(splitting, tau)))
-        except WorkbenchError:
-            continue
-    return Paper(
-        str(source.file), source.candidate, subject.takes_force, splitting, seen.floors, tuple(exams),
-        _parts(splitting, start), len(seen.entries) // len(subject.joints), SAFETY * seen.noise,
-    )  # fmt: skip
-
-
-def _parts(splitting: FloatArray, tau: FloatArray) -> FloatArray:
-    found: FloatArray = np.einsum("pk,ksn->psn", splitting, tau)
-    return found
-
-
-def splitting_of(plan: Plan, with_force: bool) -> FloatArray:
-    """The matrix ``(parts, probes)`` that `take_apart` is, and a row for each state with everything at once."""
-    probes = len(plan.labels)
-    one = plan.at(1)
-    columns = []
-    for probe in range(probes):
-        tau = np.zeros((probes, 1, len(plan.rates)))
-        tau[probe] = 1.0
-        parts = {part: values for part, values in _linear(one, tau, with_force).items() if part.kind != REST}
-        columns.append([float(values[0, 0]) for values in parts.values()])
-    matrix = np.array(columns).T
-    known = [part for part in parts if part.kind != "odd"]
-    rows = [i for i, part in enumerate(parts) if part.kind != "odd"]
-    mixed = []
-    for index, label in enumerate(plan.labels):
-        if label[0] == "mixed":
-            row = -design(one, known, index) @ matrix[rows]
-            row[index] += 1.0
-            mixed.append(row)
-    return np.vstack([matrix, *mixed])
-
-
-def _linear(plan: Plan, tau: FloatArray, with_force: bool) -> dict[Part, FloatArray]:
-    """`take_apart` of unit answers; its choice of the larger of two odd parts is taken back to their sum."""
-    return take_apart(plan, tau, with_force)
-
-
-def groups_of(parameters: Sequence[Parameter]) -> dict[str, list[str]]:
-    """Parameter -> those of the same unit: any of them might have been meant."""
-    return {p.name: [o.name for o in parameters if o.unit == p.unit and o.name != p.name] for p in parameters}
-
-
-def missing_in(seen: Examined) -> frozenset[str]:
-    """Parameters that are missing from a part somewhere: a term with them may have been left out."""
-    shares = [share for share in seen.shares if any(entry.ratio == 0 for entry in share.wrong)]
-    return frozenset(share.parameter.name for share in shares)
-
-
-def lines_run(subject: Subject, plan: Plan) -> set[int] | None:
-    """Lines of the formula's file that it runs through; None where that cannot be seen."""
-    source = subject.source
-    if source is None:
-        return None
-    file, lines = str(source.file), set()
-    q, qd, qdd, force = (array[:, 0] for array in (plan.q, plan.qd, plan.qdd, plan.force))
-
-    def trace(frame: FrameType, event: str, argument: object) -> Any:
-        if frame.f_code.co_filename != file:
-            return None
-        if event == "line":
-            lines.add(frame.f_lineno)
-        return trace
-
-    before = sys.gettrace()
-    sys.settrace(trace)
-    try:
-        subject.formula(q, qd, qdd, force, {})
-    except WorkbenchError:
-        pass
-    finally:
-        sys.settrace(before)
-    return lines or None
+def distinct_looks(nodes: list[Node]) -> list[Node]:
+    """One node of each effect, of nodes that are sorted by it."""
+    return [n for i, n in enumerate(nodes) if i == 0 or not n.look.like(nodes[i - 1].look)]

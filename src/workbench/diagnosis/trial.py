@@ -16,6 +16,8 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.campaign.bounded_call import UnrulyError, bounded
 from workbench.campaign.formula_files import Siblings
+from workbench.diagnosis.edits import Edit
+from workbench.diagnosis.replay import OutsideError, Tape
 from workbench.robots.registration import MARK
 
 ONE_EDIT_S = 2.0
@@ -23,6 +25,11 @@ ONE_EDIT_S = 2.0
 
 RIGHT = 1e-7
 NOTHING = 1e-9
+
+FIRST = (0,)
+
+MOST_TAPES = 4
+"""Texts whose runs a worker remembers."""
 
 MODULE = "workbench_mended_candidate"
 
@@ -54,8 +61,10 @@ class Paper:
     """the robot as it is first, then with parameters changed one by one"""
     start: FloatArray
     """``(parts, poses, na)`` of the first exam by the formula as it is"""
-    named: int
-    """how many of the parts are parts; the others are states with everything at once"""
+    jacobian: FloatArray | None
+    """``(poses, 3, na)`` the reference's, where it is square and regular: errors are looked at per direction, too"""
+    forces: int | None
+    """where among the parts the responses to the three components of the force begin"""
     noise: float
     """fraction of the floors that is noise of the formula's own"""
 
@@ -76,11 +85,17 @@ class Score:
     """``(parts, na)`` which are other than the unedited formula's"""
     complete: bool
     """all of them, in all exams"""
+    behind: int
+    """numbers behind the entries that are right: elements of the inverse Jacobian, each belonging to one limb, and
+    errors per direction of the platform; a mend may bring these before any entry"""
+    found: FloatArray
+    """``(parts, poses, na)`` of the robot as it is"""
+    exams: int = 1
 
     @property
     def key(self) -> tuple[int, float]:
-        """For sorting."""
-        return self.right, self.total
+        """For sorting: what is right of the robot as it is, and of the others; then how wrong the rest is."""
+        return self.right + self.exams * self.behind, self.total
 
     def like(self, other: Score) -> bool:
         """Whether two edits have the same effect."""
@@ -165,29 +180,38 @@ def torques_of(paper: Paper, function: Callable[..., Any], exam: Exam) -> FloatA
         return np.full_like(exam.parts, np.nan)
     if tau.shape != q.shape:
         return np.full_like(exam.parts, np.nan)
-    found: FloatArray = np.einsum("pk,ksn->psn", paper.splitting, tau.reshape(paper.splitting.shape[1], -1, q.shape[1]))
+    return parts_of(paper, tau)
+
+
+def parts_of(paper: Paper, tau: FloatArray) -> FloatArray:
+    """Split torques ``(n, na)`` of all probes into parts ``(parts, poses, na)``."""
+    rows = tau.reshape(paper.splitting.shape[1], -1, tau.shape[1])
+    found: FloatArray = np.einsum("pk,ksn->psn", paper.splitting, rows)
     return found
 
 
-def score(paper: Paper, text: str, exams: int | None = None) -> Score | None:
-    """Score a source text on the first few exams, None for all; None where it does not run."""
+def score(paper: Paper, text: str, exams: tuple[int, ...] | None = None) -> Score | None:
+    """Score a source text on some exams, by number, 0 first, or on all; None where it does not run."""
     try:
         function = bounded(lambda: load_text(text, paper.path, paper.candidate), ONE_EDIT_S)
     except UnrulyError:
         return None
-    right, total, complete = 0, 0.0, True
-    base = moved = np.zeros(0, dtype=np.bool_)
-    masks = []
-    first: FloatArray | None = None
-    for number, exam in enumerate(paper.exams[:exams]):
-        found = torques_of(paper, function, exam)
-        if number == 0 and not np.isfinite(found).any():
+    answers = []
+    chosen = paper.exams if exams is None else tuple(paper.exams[number] for number in exams)
+    for exam in chosen:
+        answers.append(torques_of(paper, function, exam))
+        if len(answers) == 1 and not np.isfinite(answers[0]).any():
             return None
+    return judged(paper, answers, chosen)
+
+
+def judged(paper: Paper, answers: Sequence[FloatArray], exams: Sequence[Exam]) -> Score:
+    """Hold parts against the reference's; in all exams but the first by what a changed parameter changes."""
+    right, total, complete = 0, 0.0, True
+    first, masks = answers[0], []
+    for number, (found, exam) in enumerate(zip(answers, exams, strict=True)):
         wanted = exam.parts
-        if number == 0:
-            first = found
-        else:
-            assert first is not None
+        if number > 0:
             poses = found.shape[1]
             found, wanted = found - first[:, :poses], wanted - paper.exams[0].parts[:, :poses]
         good, logs = _entries(paper, found, wanted, number > 0)
@@ -195,10 +219,38 @@ def score(paper: Paper, text: str, exams: int | None = None) -> Score | None:
         right += int(good.sum())
         total -= float(logs.sum())
         complete = complete and bool(good.all())
-        if number == 0:
-            base = good
-            moved = ~(np.abs(found - paper.start).max(axis=1) <= NOTHING * paper.floors)
-    return Score(right, total, base, np.concatenate(masks), moved, complete)
+    base = masks[0].reshape(first.shape[0], -1)
+    moved = ~(np.abs(first - paper.start).max(axis=1) <= NOTHING * paper.floors)
+    mask = np.concatenate(masks)
+    return Score(right, total, base, mask, moved, complete, _behind(paper, first), first, len(answers))
+
+
+def nothing_right(paper: Paper, exams: int) -> Score:
+    """Score of a formula that does not answer."""
+    nothing = [np.full_like(exam.parts, np.nan) for exam in paper.exams[:exams]]
+    return judged(paper, nothing, paper.exams[:exams])
+
+
+def _behind(paper: Paper, found: FloatArray) -> int:
+    """Count the numbers behind the entries that are right."""
+    jacobian = paper.jacobian
+    if jacobian is None or not np.isfinite(found).all():
+        return 0
+    inverse, wanted = np.linalg.inv(jacobian), paper.exams[0].parts
+    pushed = np.einsum(
+        "saj,psj->psa", inverse.swapaxes(1, 2), np.stack([found - wanted, wanted]).reshape(-1, *found.shape[1:])
+    )
+    gap, size = np.abs(pushed).max(axis=1).reshape(2, found.shape[0], -1)
+    right = int((gap <= RIGHT * np.maximum(size, 1e-3 * size.max())).sum())
+    if paper.forces is None:
+        return right
+    rows = slice(paper.forces, paper.forces + 3)
+    try:
+        mine, theirs = (np.linalg.inv(parts[rows].swapaxes(0, 1)) for parts in (found, wanted))
+    except np.linalg.LinAlgError:
+        return right
+    size = np.abs(theirs).max(axis=0)
+    return right + int((np.abs(mine - theirs).max(axis=0) <= RIGHT * np.maximum(size, 1e-3 * size.max())).sum())
 
 
 def _entries(paper: Paper, found: FloatArray, wanted: FloatArray, share: bool) -> tuple[np.ndarray, FloatArray]:
@@ -211,11 +263,17 @@ def _entries(paper: Paper, found: FloatArray, wanted: FloatArray, share: bool) -
     return good, logs
 
 
-Task = tuple[Sequence[str], int | None]
+@dataclass(frozen=True)
+class Task:
+    """What a worker is asked: texts on exams by number, or edits of one text on the first exam alone."""
+
+    texts: tuple[str, ...]
+    exams: tuple[int, ...] | None = None
+    edits: tuple[Edit, ...] | None = None
 
 
 class Setup:
-    """Makes the function that a worker calls with texts; travels there by pickle."""
+    """Makes the function that a worker calls with tasks; travels there by pickle."""
 
     def __init__(self, paper: Paper) -> None:
         self.paper = paper
@@ -224,9 +282,60 @@ class Setup:
         """Prepare the parameters and return the function."""
         exams = tuple(dataclasses.replace(exam, values=_named_values(exam.values)) for exam in self.paper.exams)
         paper = dataclasses.replace(self.paper, exams=exams)
+        looks = Looks(paper)
 
         def work(task: Task) -> list[Score | None]:
-            texts, count = task
-            return [score(paper, text, count) for text in texts]
+            if task.edits is not None:
+                return [looks.score(task.texts[0], edit) for edit in task.edits]
+            return [score(paper, text, task.exams) for text in task.texts]
 
         return work
+
+
+class Looks:
+    """Scores edits of a text on the first exam, by replaying what they reach."""
+
+    def __init__(self, paper: Paper) -> None:
+        self._paper = paper
+        self._tapes: dict[str, Tape | None] = {}
+        q, qd, qdd, force = paper.exams[0].states
+        self._given = (q, qd, qdd, force) if paper.with_force else (q, qd, qdd)
+
+    def score(self, text: str, edit: Edit) -> Score | None:
+        """Score a text with one edit; None where it does not run."""
+        if text not in self._tapes:
+            if len(self._tapes) >= MOST_TAPES:
+                self._tapes.pop(next(iter(self._tapes)))
+            self._tapes[text] = self._recorded(text)
+        tape = self._tapes[text]
+        if tape is None:
+            return score(self._paper, edit.apply(text), FIRST)
+        try:
+            tau = self._answer(lambda values, *given: tape.replay(edit, values, *given))
+        except UnrulyError as error:
+            return score(self._paper, edit.apply(text), FIRST) if isinstance(error.error, OutsideError) else None
+        if tau.shape != self._given[0].shape or not np.isfinite(tau).any():
+            return None
+        return judged(self._paper, [parts_of(self._paper, tau)], self._paper.exams[:1])
+
+    def _answer(self, function: Callable[..., Any]) -> FloatArray:
+        values = self._paper.exams[0].values
+
+        def call() -> FloatArray:
+            with np.errstate(all="ignore"), siblings_of(self._paper.path).visible():
+                return np.asarray(function(values, *self._given), dtype=np.float64)
+
+        return bounded(call, ONE_EDIT_S)
+
+    def _recorded(self, text: str) -> Tape | None:
+        """The text's run; None where going through it statement by statement does not give just what it gives."""
+        paper = self._paper
+        kept = [array.copy() for array in self._given]
+        try:
+            function = bounded(lambda: load_text(text, paper.path, paper.candidate), ONE_EDIT_S)
+            tape = Tape(text, paper.path, vars(sys.modules[MODULE]), function)
+            plain, taped = self._answer(function), self._answer(tape.record)
+        except (UnrulyError, SyntaxError):
+            return None
+        untouched = all(np.array_equal(one, other) for one, other in zip(kept, self._given, strict=True))
+        return tape if untouched and np.array_equal(plain, taped, equal_nan=True) else None

@@ -160,6 +160,7 @@ class OrderedClosure(Continuation):
         moved, predicted = self._predict(found, rows, np.diff(q, axis=0))
         near = self._apart(predicted, found.qpos[1:]) <= np.maximum(CORRECTION * moved, NEGLIGIBLE)
         linked = near & (moved <= LONGEST_STEP)
+        linked &= self._on_side(found, rows, found.at(slice(1, None)), linked)
         again = np.flatnonzero(~linked)
         if len(again):  # a longer way takes several steps; again all at once, and only compared
             stepped = self._nothing(len(q), q.shape[1])

@@ -18,6 +18,7 @@ from workbench.reference.kernels import integrate, keep_if_better
 from workbench.reference.kinematics import Kinematics, Places, place, room
 from workbench.reference.linear import factor, solved
 from workbench.reference.rows import constraint_rows
+from workbench.reference.sides import NO_SIDES, UNKNOWN, SideTable, side_of, turned_over
 from workbench.reference.tables import ClosureTables
 
 NEAR, LINES, CHAIN = 0, 1, 2
@@ -37,6 +38,8 @@ class Mechanism(NamedTuple):
     """``(nv,)`` what a unit of each velocity counts"""
     coordinate_weights: FloatArray
     """``(nq,)``"""
+    sides: SideTable = NO_SIDES
+    """known once the home pose is closed"""
 
 
 class Rules(NamedTuple):
@@ -74,7 +77,12 @@ class Bench(NamedTuple):
     facts: FloatArray
     """``(4,)`` residual, rank, condition, weakest"""
     facts_here: FloatArray
+    sides: np.ndarray
+    """``(2,)`` of the last closing, and here: on which side of their singular poses"""
     jacobian: FloatArray
+    both: FloatArray
+    """``(m, 2 p)`` for `turned_over`"""
+    work: FloatArray
     residual: FloatArray
     a: FloatArray
     beta: FloatArray
@@ -98,7 +106,7 @@ def bench(mechanism: Mechanism) -> Bench:
         array.flags.writeable = False
     return Bench(
         places, seen, np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros((nv, na)),
-        np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros((m, nv)), np.zeros(m),
+        np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros(2, dtype=np.int64), np.zeros((m, nv)), np.zeros((m, 2 * p)), np.zeros((p, p)), np.zeros(m),
         np.zeros((m, p + na + 1)), np.zeros(p), np.zeros(p, dtype=np.int64), np.zeros(p), np.zeros(nv), np.zeros(nv),
         np.zeros(1), np.zeros((4, na)),
     )  # fmt: skip
@@ -146,6 +154,7 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     passive, actuated, qpos, step, x = mechanism.passive, mechanism.actuated, w.qpos, w.step, w.x
     limits = (rules.closed, rules.floor, rules.astray, rules.settles)
     w.best[0] = math.inf
+    w.sides[0] = UNKNOWN
     w.facts[1], w.facts[2], w.facts[3] = 0.0, math.inf, 0.0
     for _ in range(rules.steps):
         place(kin, qpos, w.places)
@@ -159,6 +168,8 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
         found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order)
         if good:
             _noted(passive, actuated, w.a, w.order, found, x, w.tangent, w.facts)
+            if w.sides[0] == UNKNOWN or rules.settles:  # the step to rounding does not change it
+                w.sides[0] = side_of(w.jacobian, w.a, found, mechanism.sides, w.work)
         if not again:
             break
         solved(w.a, w.order, found, w.a.shape[1] - 1, x)
@@ -201,6 +212,35 @@ def _copy_rows(values, out):  # type: ignore[no-untyped-def]
             out[i, j] = values[i, j]
 
 
+@compiled
+def _jacobian(mechanism, w, qpos, first):  # type: ignore[no-untyped-def]
+    """Put the columns of a closed configuration that are solved for into ``Bench.both``, from column *first*."""
+    kin, seen, columns = mechanism.kinematics, w.seen, mechanism.sides.columns
+    place(kin, qpos, w.places)
+    constraint_rows(
+        mechanism.closures, mechanism.joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat,
+        seen.anchors, w.jacobian, w.residual,
+    )  # fmt: skip
+    for i in range(w.both.shape[0]):
+        for j in range(columns.shape[0]):
+            w.both[i, first + j] = w.jacobian[i, columns[j]]
+
+
+@inlined
+def _on_side(mechanism, w):  # type: ignore[no-untyped-def]
+    """Whether the step from ``Bench.here`` to ``Bench.kept`` passes no singular pose, as `Continuation._on_side`."""
+    before, after = w.sides[1], w.sides[0]
+    if mechanism.sides.least == 0.0:
+        if after == UNKNOWN:
+            w.sides[0] = before
+        return before == UNKNOWN or before == w.sides[0]
+    if before == after and after != UNKNOWN:
+        return True
+    _jacobian(mechanism, w, w.here, 0)
+    _jacobian(mechanism, w, w.kept, mechanism.sides.columns.shape[0])
+    return not turned_over(w.both, mechanism.sides)
+
+
 @inlined
 def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
     """Follow the straight line from ``Bench.ways[3]`` to *target* ``(na,)``; returns how much of it was gone, 0 to 1.
@@ -235,8 +275,9 @@ def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
             squared += ((w.kept[i] - w.predicted[i]) * mechanism.coordinate_weights[i]) ** 2
         correction = math.sqrt(squared)
         small = correction <= max(rules.correction * moved, rules.negligible)
-        if w.facts[0] <= rules.closed and small and moved <= rules.longest:
+        if w.facts[0] <= rules.closed and small and moved <= rules.longest and _on_side(mechanism, w):
             _copy(w.kept, w.here)
+            w.sides[1] = w.sides[0]
             _copy_rows(w.tangent, w.tangent_here)
             _copy(w.facts, w.facts_here)
             done = 1.0 if last else done + part
@@ -269,7 +310,7 @@ def _bend(w, target, s, size):  # type: ignore[no-untyped-def]
 
 @compiled
 def advance(  # type: ignore[no-untyped-def]
-    mechanism, rules, w, how, start, target, first, last, qpos, residual, tangent, rank, condition, weakest, done
+    mechanism, rules, w, how, start, target, first, last, qpos, residual, tangent, rank, condition, weakest, side, done
 ):  # fmt: skip
     """Close samples *first* to *last* - 1 in one of three ways; a single kernel, which compiles once.
 
@@ -290,6 +331,7 @@ def advance(  # type: ignore[no-untyped-def]
             close_one(mechanism, rules, w)
             _copy(w.kept, w.here)
             _copy(w.facts, w.facts_here)
+            w.sides[1] = w.sides[0]
             for i in range(w.tangent.shape[0]):
                 for j in range(w.tangent.shape[1]):
                     w.tangent_here[i, j] = w.tangent[i, j] if w.facts[0] <= rules.closed else 0.0
@@ -300,6 +342,7 @@ def advance(  # type: ignore[no-untyped-def]
                 _copy_rows(tangent[r], w.tangent_here)
                 w.facts_here[0], w.facts_here[1] = residual[r], rank[r]
                 w.facts_here[2], w.facts_here[3] = condition[r], weakest[r]
+                w.sides[1] = side[r]
             if how == LINES:
                 _copy(start[s], w.ways[3])
             else:
@@ -314,5 +357,5 @@ def advance(  # type: ignore[no-untyped-def]
         _copy(w.here, qpos[s])
         _copy_rows(w.tangent_here, tangent[s])
         residual[s], rank[s] = w.facts_here[0], np.int64(w.facts_here[1])
-        condition[s], weakest[s] = w.facts_here[2], np.int64(w.facts_here[3])
+        condition[s], weakest[s], side[s] = w.facts_here[2], np.int64(w.facts_here[3]), w.sides[1]
     return last

@@ -19,6 +19,7 @@ from workbench.reference.kernels import integrate, newton_step
 from workbench.reference.kinds import JOINT, TENDON
 from workbench.reference.kinematics import is_covered, kinematics_of
 from workbench.reference.rows import constraint_rows
+from workbench.reference.sides import pattern_of
 from workbench.reference.structure import Structure
 from workbench.reference.tables import tables_of
 from workbench.reference.tolerance import KEY, RANK
@@ -40,6 +41,9 @@ class LoopCloser(OrderedClosure):
         self.mechanism = self._mechanism() if compiled and is_covered(engine.model) else None
         self._home = self._close_home(structure.home_qpos[None, :].copy())
         self.home = self._home.qpos[0]
+        self._look_at_sides(self.jacobian(self.home), pattern_of(structure, self.joints[2]), structure.passive)
+        if self.mechanism is not None:
+            self.mechanism = self.mechanism._replace(sides=self._side_table)
         self.start = self.home[structure.actuated_qpos]
 
     def _close_home(self, home: FloatArray) -> Assembly:
@@ -120,6 +124,9 @@ class LoopCloser(OrderedClosure):
             qpos=closed[0].tolist(),
         )
 
+    def _solved(self, qpos: FloatArray) -> FloatArray:
+        return np.stack([self.jacobian(one) for one in qpos])[:, :, self._side_table.columns]
+
     @property
     def at_home(self) -> Assembly:
         """The pose from which all others are reached, and what is known of it."""
@@ -174,8 +181,8 @@ class LoopCloser(OrderedClosure):
         for _ in range(NEWTON_STEPS):
             poses = evaluator.place(active)
             active = newton_step(
-                active, self.tables.closures, self.joints, self.tables.split, poses.tables, limits, qpos, found.qpos,
-                found.residual, found.tangent, found.rank, found.condition, found.weakest,
+                active, self.tables.closures, self.joints, self.tables.split, self._side_table, poses.tables, limits,
+                qpos, found.qpos, found.residual, found.tangent, found.rank, found.condition, found.weakest, found.side,
             )  # fmt: skip
             if not len(active):
                 break

@@ -17,7 +17,8 @@ from workbench.arrays import FloatArray
 from workbench.reference.closing import Rules
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import predict
-from workbench.reference.structure import Structure
+from workbench.reference.sides import NO_SIDES, UNKNOWN, SideTable, side_at, side_table, turned_over
+from workbench.reference.structure import IntArray, Structure
 from workbench.reference.tables import tables_of
 from workbench.reference.tolerance import tolerance_of, weights_of
 
@@ -72,6 +73,8 @@ class Assembly:
     """``(n,)`` estimate of their condition number"""
     weakest: np.ndarray
     """``(n,)`` velocity address of the freedom that they determine worst"""
+    side: np.ndarray
+    """``(n,)`` on which side of their singular poses, see `workbench.reference.sides`"""
 
     @staticmethod
     def empty(samples: int, nq: int, nv: int, given: int) -> Assembly:
@@ -83,6 +86,7 @@ class Assembly:
             rank=np.zeros(samples, dtype=np.int64),
             condition=np.full(samples, np.inf),
             weakest=np.zeros(samples, dtype=np.int64),
+            side=np.full(samples, UNKNOWN, dtype=np.int64),
         )
 
     def at(self, rows: np.ndarray | slice) -> Assembly:
@@ -97,7 +101,7 @@ class Assembly:
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
         """The arrays as the kernels take them."""
-        return self.qpos, self.residual, self.tangent, self.rank, self.condition, self.weakest
+        return self.qpos, self.residual, self.tangent, self.rank, self.condition, self.weakest, self.side
 
 
 class Continuation(ABC):
@@ -105,6 +109,8 @@ class Continuation(ABC):
 
     _home: Assembly
     """the home pose alone, to be set by the subclass"""
+    _side_table: SideTable = NO_SIDES
+    """which determinants are looked at; known once the home pose is"""
     start: FloatArray
     """``(m,)`` the given coordinates of the home pose, likewise"""
 
@@ -227,6 +233,7 @@ class Continuation(ABC):
             small = correction <= np.maximum(CORRECTION * moved, NEGLIGIBLE)
             accepted = (closed.residual <= self.tolerance.residual) & small & (moved <= LONGEST_STEP)
             accepted &= self._on_branch(closed)
+            accepted &= self._on_side(here, active, closed, accepted)
             here.put(active[accepted], closed, accepted)
             done[active[accepted]] += part[accepted]
             step[active[accepted]] *= 2.0
@@ -262,6 +269,30 @@ class Continuation(ABC):
         self.engine.in_blocks(lambda evaluator, _: results.append(self._newton(evaluator, qpos, aim)), 1)
         return results[0]
 
+    def _look_at_sides(self, rows: FloatArray, pattern: np.ndarray, columns: IntArray) -> None:
+        """From now on no step passes a singular pose; *rows* ``(m, nv)`` at home, and where they may not be zero."""
+        self._side_table = side_table(rows[:, columns], pattern[:, columns], columns)
+        self._home.side[:] = side_at(rows, columns, self._side_table)
+
+    def _on_side(self, here: Assembly, rows: np.ndarray, closed: Assembly, wanted: np.ndarray) -> np.ndarray:
+        """Which of the *wanted* steps ``(k,)`` from *rows* of closed configurations pass no singular pose.
+
+        A configuration in a singular pose has no side and inherits the one that it was reached from.
+        """
+        before, after, table = here.side[rows], closed.side, self._side_table
+        if table.least == 0.0:
+            lost = after == UNKNOWN
+            after[lost] = before[lost]
+            square: np.ndarray = (before == UNKNOWN) | (before == after)
+            return square
+        # chosen rows may turn over among the others, where the mechanism does not
+        same: np.ndarray = (before == after) & (after != UNKNOWN)
+        doubtful = np.flatnonzero(wanted & ~same)
+        if len(doubtful):
+            jacobians = self._solved(here.qpos[rows[doubtful]]), self._solved(closed.qpos[doubtful])
+            same[doubtful] = [not turned_over(both, table) for both in np.concatenate(jacobians, axis=2)]
+        return same
+
     def _nothing(self, samples: int, given: int) -> Assembly:
         model = self.engine.model
         return Assembly.empty(samples, model.nq, model.nv, given)
@@ -272,6 +303,10 @@ class Continuation(ABC):
 
         Where coordinates are held by writing them, they are written into *start*.
         """
+
+    @abstractmethod
+    def _solved(self, qpos: FloatArray) -> FloatArray:
+        """Jacobians ``(k, m, p)`` of what Newton solves for, columns in the order of the side table."""
 
     @abstractmethod
     def _refuse(self, sample: int, target: FloatArray, reached: FloatArray, there: Assembly) -> None:

@@ -13,6 +13,7 @@ from workbench.compiled import compiled, inlined
 from workbench.reference.kinds import BALL, CONNECT, FREE, WELD
 from workbench.reference.linear import factor, solve, solve_transposed, solved
 from workbench.reference.rows import acceleration_rows, body_motion, constraint_rows, point_motion
+from workbench.reference.sides import UNKNOWN, side_of
 
 
 @compiled
@@ -100,12 +101,15 @@ def keep_if_better(res, limits, qpos, kept, best, s):  # type: ignore[no-untyped
 
 
 @compiled
-def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, tangent, rank, condition, weakest):  # type: ignore[no-untyped-def]
+def newton_step(  # type: ignore[no-untyped-def]
+    ids, closures, joints, split, table, poses, limits, qpos, kept, best, tangent, rank, condition, weakest, side
+):  # fmt: skip
     """One Newton step on the passive joints of the listed samples; returns those that need another, as a new list.
 
     ``poses`` belong to ``qpos``. The best configuration so far goes to ``kept``, its largest residual to ``best``; once
     it is closed, also its tangent (velocities per unit actuated velocity), the rank of the passive Jacobian, an
-    estimate of its condition and the freedom that it determines worst. ``limits``: residual of a closed loop, residual
+    estimate of its condition, the freedom that it determines worst, and the side of its singular poses by ``table``
+    (`workbench.reference.sides`). ``limits``: residual of a closed loop, residual
     at which rounding is reached, residual from which Newton does not come back, and whether the loops agree only to
     some digits: then the residual has a floor of its own, every step counts, and the last one is kept.
     """
@@ -114,7 +118,7 @@ def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, t
     m, nv, p, na = closures.block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
     a, beta, perm, x = np.empty((m, p)), np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
-    step = np.zeros(nv)
+    step, work = np.zeros(nv), np.empty((p, p))
     active = np.empty_like(ids)
     more = 0
     for n in range(ids.shape[0]):
@@ -142,6 +146,8 @@ def newton_step(ids, closures, joints, split, poses, limits, qpos, kept, best, t
             else:
                 condition[s] = abs(a[0, 0] / a[p - 1, p - 1]) if found == p else math.inf
                 weakest[s] = passive[perm[min(found, p - 1)]]
+            if side[s] == UNKNOWN or limits[3]:  # the step to rounding does not change it
+                side[s] = side_of(jac, a, found, table, work)
         if again:
             for i in range(m):
                 rhs[i] = -res[i]

@@ -224,53 +224,65 @@ class PinocchioLoops:
         """Follow the closed configurations from *start* to the actuated coordinates *aim*; None where the way ends."""
         here, origin = start, start[self.actuated_q]
         done, step, residual = 0.0, 1.0, 0.0
+        jacobian = self.linear(here).jacobian
         while done < 1.0:
             part = min(step, 1.0 - done)
             to = aim if done + part >= 1.0 else origin + (done + part) * (aim - origin)
-            after = self._step(here, to)
+            after = self._step(here, jacobian, to)
             if after is not None:
-                (here, residual), done, step = after, done + part, 2.0 * step
+                (here, residual, jacobian), done, step = after, done + part, 2.0 * step
             else:
                 step = 0.5 * part
                 if step < SMALLEST_STEP:
                     return None
         return here, residual
 
-    def _step(self, here: FloatArray, to: FloatArray) -> tuple[FloatArray, float] | None:
-        """Go along the tangent to the actuated coordinates *to* and close; None where that is no small correction."""
+    def _step(
+        self, here: FloatArray, jacobian: FloatArray, to: FloatArray
+    ) -> tuple[FloatArray, float, FloatArray] | None:
+        """Go along the tangent to the actuated coordinates *to* and close; None where that may be another assembly."""
         velocity = np.zeros(self.model.nv)
         velocity[self.actuated] = to - here[self.actuated_q]
-        jacobian = self.linear(here).jacobian
         velocity[self.passive] = self.solve(jacobian, -jacobian[:, self.actuated] @ velocity[self.actuated])[0]
         moved = float(np.linalg.norm(velocity))
         if not moved <= LONGEST_STEP:
             return None
         predicted = self.pin.integrate(self.model, here, velocity)
         predicted[self.actuated_q] = to
-        closed, residual = self._newton(predicted)
+        closed, residual, after = self._newton(predicted)
         correction = np.linalg.norm(self.pin.difference(self.model, predicted, closed))
-        if residual <= CLOSED and correction <= max(CORRECTION * moved, NEGLIGIBLE):
-            return closed, residual
-        return None
+        small = residual <= CLOSED and correction <= max(CORRECTION * moved, NEGLIGIBLE)
+        return (closed, residual, after) if small and self._same_side(jacobian, after) else None
 
-    def _newton(self, q: FloatArray) -> tuple[FloatArray, float]:
-        """Newton on the passive joints until rounding stops it; the best configuration and its residual."""
-        best, least = q, np.inf
+    def _same_side(self, before: FloatArray, after: FloatArray) -> bool:
+        """Whether no singular pose lies between two neighbours, which another assembly would be beyond.
+
+        The change T of the passive columns, ``before T = after``, is near one for near neighbours; a column that lost
+        its independence on the way and regained it the other way round is an eigenvalue on the other side of zero.
+        """
+        if not len(self.passive):
+            return True
+        change = np.linalg.lstsq(before[:, self.passive], after[:, self.passive], rcond=RANK)[0]
+        return bool(np.isfinite(change).all() and np.linalg.eigvals(change).real.min() > 0.0)
+
+    def _newton(self, q: FloatArray) -> tuple[FloatArray, float, FloatArray]:
+        """Newton on the passive joints until rounding stops it; the best configuration, its residual and Jacobian."""
+        best, least, jacobian = q, np.inf, np.zeros((0, 0))
         for _ in range(NEWTON_STEPS):
             now = self.linear(q)
             residual = float(np.abs(now.residual).max(initial=0.0))
             if not residual < least:  # no better, or not a number
                 break
-            best, least = q, residual
+            best, least, jacobian = q, residual, now.jacobian
             if residual <= 0.01 * CLOSED:
                 break
             step = np.zeros(self.model.nv)
             step[self.passive] = self.solve(now.jacobian, -now.residual)[0]
             q = self.pin.integrate(self.model, q, step)
-        return best, least
+        return best, least, jacobian
 
     def _close_home(self, q: FloatArray) -> FloatArray:
-        closed, residual = self._newton(q)
+        closed, residual, _ = self._newton(q)
         file = self.structure.file
         if not residual <= CLOSED:
             raise ModelError(

@@ -13,10 +13,11 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError, ParameterError
-from workbench.reference.closure import LoopCloser
+from workbench.reference.closure import LoopCloser, constraint_jacobian
 from workbench.reference.continuation import ASTRAY, NEWTON_STEPS, Assembly, Continuation
 from workbench.reference.engine import Evaluator
 from workbench.reference.platform_kernels import platform_accelerations, platform_jacobian, platform_newton
+from workbench.reference.sides import pattern_of
 from workbench.reference.task import COORDINATES, POSITIONS, Task, task_of
 from workbench.reference.tolerance import rank_of
 
@@ -80,6 +81,9 @@ class PlatformCloser(Continuation):
         self._sign = np.ones(1)
         self._home = self._newton_alone(self.home[None, :].copy(), self.start[None, :])
         self._sign = self._signs(self._home)
+        moved = np.tile(structure.moves[self._site[0]], (len(leading), 1))
+        pattern = np.concatenate([pattern_of(structure, self.joints[2]), moved])
+        self._look_at_sides(self._all_rows(self.home), pattern, np.arange(model.nv))
 
     def accelerations(
         self, assembly: Assembly, x: FloatArray, xd: FloatArray, xdd: FloatArray
@@ -148,6 +152,14 @@ class PlatformCloser(Continuation):
         self.engine.in_blocks(block, n)
         return rows, values
 
+    def _all_rows(self, qpos: FloatArray) -> FloatArray:
+        """Rows of the loops, then of the task coordinates, of one configuration: ``(m, nv)``."""
+        loops = constraint_jacobian(self.engine, self.structure, self.joints, qpos[None, :])[0]
+        return np.concatenate([loops, self._rows(qpos[None, :], self.start[None, :])[0][0]])
+
+    def _solved(self, qpos: FloatArray) -> FloatArray:
+        return np.stack([self._all_rows(one) for one in qpos])[:, :, self._side_table.columns]
+
     def _newton(self, evaluator: Evaluator, start: FloatArray, aim: FloatArray) -> Assembly:
         count = len(start)
         found = self._nothing(count, aim.shape[1])
@@ -159,8 +171,9 @@ class PlatformCloser(Continuation):
         for _ in range(NEWTON_STEPS):
             poses = evaluator.place(active)
             active = platform_newton(
-                active, self.tables.closures, self.joints, self._table, self._base, poses.tables, limits, aim, qpos,
-                found.qpos, found.residual, found.tangent, found.rank, found.condition, found.weakest,
+                active, self.tables.closures, self.joints, self._table, self._base, self._side_table, poses.tables,
+                limits, aim, qpos, found.qpos, found.residual, found.tangent, found.rank, found.condition,
+                found.weakest, found.side,
             )  # fmt: skip
             if not len(active):
                 break

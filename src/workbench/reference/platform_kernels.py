@@ -14,12 +14,14 @@ from workbench.compiled import compiled
 from workbench.reference.kernels import integrate, keep_if_better
 from workbench.reference.linear import factor, solve
 from workbench.reference.rows import acceleration_rows, body_motion, constraint_rows
+from workbench.reference.sides import UNKNOWN, side_of
 from workbench.reference.task_rows import task_acceleration, task_rows
 
 
 @compiled
 def platform_newton(  # type: ignore[no-untyped-def]
-    ids, closures, joints, task, base, poses, limits, aim, qpos, kept, best, tangent, rank, condition, weakest
+    ids, closures, joints, task, base, table, poses, limits, aim, qpos, kept, best, tangent, rank, condition, weakest,
+    side,
 ):  # fmt: skip
     """One Newton step on all joints of the listed samples, the task coordinates at ``aim``; returns the unfinished.
 
@@ -33,6 +35,7 @@ def platform_newton(  # type: ignore[no-untyped-def]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
     values, rise, still = np.empty(given), np.empty(given), np.zeros(3)
     a, beta, perm, x = np.empty((m, nv)), np.empty(nv), np.empty(nv, dtype=np.int64), np.empty(nv)
+    work = np.empty((nv, nv))
     active = np.empty_like(ids)
     more = 0
     for n in range(ids.shape[0]):
@@ -62,6 +65,8 @@ def platform_newton(  # type: ignore[no-untyped-def]
             rank[s] = found
             condition[s] = abs(a[0, 0] / a[nv - 1, nv - 1]) if found == nv else math.inf
             weakest[s] = perm[min(found, nv - 1)]
+            if side[s] == UNKNOWN or limits[3]:  # the step to rounding does not change it
+                side[s] = side_of(jac, a, found, table, work)
         if again:
             for i in range(m):
                 rhs[i] = -res[i]

@@ -8,7 +8,7 @@ import gc
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,12 @@ from markupsafe import Markup, escape
 
 from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
+from workbench.report.bibliography import NAME, bibliography, cited_keys
 from workbench.report.cost import cost_table
 from workbench.report.data_out import DATA_FORMATS, data_files
 from workbench.report.latex import latex_table
 from workbench.report.load import Run, load_run, read_manifest
+from workbench.report.paper_table import paper_table
 from workbench.report.section import Section
 from workbench.report.sections import build_sections
 from workbench.report.style import PAPERS, STYLES, figure_style
@@ -147,13 +149,22 @@ def _rendered(
     if "pdf" in formats:
         files[run.directory / "report.pdf"] = report_pdf(run, sections, style, paper)
         costs = cost_table(run.manifest)
-        for table in (*all_tables(sections), *([costs] if costs else [])):
-            files[run.directory / TABLES / f"{table.key}.tex"] = latex_table(table).encode()
+        tables = [*all_tables(sections), *([costs] if costs else [])]
+        if isinstance(run, Run):
+            tables.append(paper_table(run))
+        for table in tables:
+            files[run.directory / TABLES / f"{table.key}.tex"] = latex_table(table, cited_keys()).encode()
+        files[run.directory / TABLES / NAME] = bibliography().encode()
     return files
 
 
 def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
     """Return the whole page."""
+    return html_page("report.html.j2", sections, _head(run))
+
+
+def html_page(template: str, sections: Sequence[Section], head: Mapping[str, Any]) -> str:
+    """Return a page that loads nothing from elsewhere: *template* around the sections, *head* is what stands above."""
     environment = _environment()
     sheet = StyleSheet()
     environment.globals["inline_svg"] = lambda plot: Markup(sheet.shorten(inline(plot.svg, plot.alt)))
@@ -164,9 +175,9 @@ def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
     style = _source(environment, "style.css")
     script = _source(environment, "report.js")
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
-    page = environment.get_template("report.html.j2")
+    page = environment.get_template(template)
     text = page.render(
-        **_head(run),
+        **head,
         sections=bodies,
         style=Markup(style + sheet.rules),
         script=Markup(script),

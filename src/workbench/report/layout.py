@@ -96,8 +96,6 @@ def figure_legend(figure: FigureBase, axes: Axes, columns: int = 2) -> None:
             ncols=columns,
             borderaxespad=0.2,
             labelspacing=0.25,
-            columnspacing=1.2,
-            handlelength=2.6,
         )
 
 
@@ -105,7 +103,7 @@ def legend(axes: Axes) -> None:
     """Put the legend inside the panel, above the curves."""
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.18 * (high - low))  # room for the legend above the curves
-    axes.legend(loc="upper right", ncols=4, borderaxespad=0.1, columnspacing=1.2, handlelength=2.4)
+    axes.legend(loc="upper right", ncols=4, borderaxespad=0.1)
 
 
 def mark(axes: Axes, time: float, value: float, text: str) -> None:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from workbench.records import Record
+from workbench.report.demand_records import ActuatorRecord, CaseDemandRecord
 
 FORMAT_VERSION = 1
 """The version of the run directory that this reader understands."""
@@ -299,6 +300,7 @@ class CaseRecord(Record):
     recorded: dict[str, RecordedRecord] = Field(default_factory=dict)
     spent: SpentRecord = SpentRecord()
     kinematics_checks: tuple[KinematicsRecord, ...] = ()
+    demand: CaseDemandRecord = CaseDemandRecord()
     warnings: tuple[str, ...] = ()
 
     @property
@@ -374,6 +376,9 @@ class Manifest(Record):
     verdict: str = ""
     """the sentence beside the status; it can always be made again from rows and cases"""
     candidates: dict[str, CandidateRecord]
+    good: float | None = Field(None, gt=0)
+    """wanted accuracy of formulas without a bound; None where nobody asked"""
+    actuators: dict[str, ActuatorRecord] = Field(default_factory=dict)
     claims: tuple[ClaimRecord, ...] = ()
     figures: tuple[FigureRecord, ...] = ()
     cases: dict[str, CaseRecord]

@@ -18,6 +18,9 @@ from workbench.report.style import BACKGROUND, INK, PALETTE
 from workbench.report.svg import OWN, POINTS_PER_INCH
 
 SIZE = (9.0, 3.6)
+NARROW = 7.0
+"""Inches below which panels stand close together: in the style of a paper."""
+UPWARDS = "upwards [m]"
 FRAME_COUNTS = (24, 48, 96, 192, 384)
 SMOOTH = 0.008
 """Share of the drawing by which a point may leave the straight line between two frames."""
@@ -186,7 +189,10 @@ def _panel(
     if not triad:
         axes.locator_params(nbins=5)
         axes.set_xlabel(view.title)
-        axes.set_ylabel("upwards [m]")
+        if size_of(figure)[0] < NARROW:  # beside the axis it would run into the neighbour
+            axes.set_title(UPWARDS)
+        else:
+            axes.set_ylabel(UPWARDS)
         return axes
     axes.set_axis_off()
     length = 0.12 * (limits[1] - limits[0])

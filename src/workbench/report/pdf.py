@@ -35,6 +35,10 @@ from workbench.report.verdict_section import changes, circumstances
 
 FULL_WIDTH_FROM = 7.0
 """inches: figures designed wider than this take the whole width of the page"""
+COLUMN, TEXT = 229.0, 344.0
+"""TeX points: a column of a two-column article, and the text of a one-column article."""
+LEAST_HEIGHT = 0.8
+"""Of the height on a page: panels side by side shrink, panels above each other need their room."""
 LONG = 36
 """Letters from which on a column of a table breaks its lines."""
 FONTS = {"page": "DejaVu Sans", "paper": "DejaVu Serif"}
@@ -71,8 +75,16 @@ def report_pdf(run: Run | SweepRun, sections: Sequence[Section], style: str = "p
 
 
 def figure_pdf(plot: Plot, style: str = "page") -> bytes:
-    """Return one figure as a PDF of its own size, for a paper."""
-    return _compiled(FIGURE, {"figure.svg": _drawing(plot, style)})
+    """Return one figure as a PDF of its own size; in the style ``paper`` of the size that it has in an article."""
+    drawing = _drawing(plot, style) if style != "paper" else _lettered(plot, plot.drawn(article_size(plot)), style)
+    return _compiled(FIGURE, {"figure.svg": drawing})
+
+
+def article_size(plot: Plot) -> tuple[float, float]:
+    """Width and height in inches on which a figure needs no scaling: of a column, or of the text where it is wide."""
+    width, height = plot.size
+    room = (TEXT if width > FULL_WIDTH_FROM else COLUMN) / 72.27  # TeX's points
+    return room, height * max(room / width, LEAST_HEIGHT)
 
 
 def all_tables(sections: Sequence[Section]) -> list[Table]:
@@ -95,7 +107,11 @@ def _fonts() -> typst.Fonts:
 
 
 def _drawing(plot: Plot, style: str) -> str:
-    return standalone(plot.svg, plot.alt).replace("font-family: sans-serif", f"font-family: {FONTS[style]}")
+    return _lettered(plot, plot.svg, style)
+
+
+def _lettered(plot: Plot, svg: str, style: str) -> str:
+    return standalone(svg, plot.alt).replace("font-family: sans-serif", f"font-family: {FONTS[style]}")
 
 
 def _picture(content: bytes, file: str) -> str:
@@ -121,6 +137,9 @@ def _blocks(section: Section, style: str, parts: dict[str, str]) -> Iterator[Blo
         yield {"kind": "verdict", **_badge(context["status"]), "sentence": context["sentence"]}
     if context.get("about"):
         yield _text(context["about"])
+    if context.get("attention"):
+        yield _text("Needs attention (no failure of a formula; the verdict stands):")
+        yield {"kind": "points", "points": list(context["attention"])}
     for name, found in context.get("diagnosis", {}).items():
         told = f"What is wrong with {name}, held against MuJoCo's {found.reference} model part by part:"
         yield _text(told)

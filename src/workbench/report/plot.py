@@ -29,7 +29,11 @@ class Plot:
     @cached_property
     def svg(self) -> str:
         """The drawing, made when it is first asked for; inside the style that is set then."""
-        figure = new_figure(*self.size)
+        return self.drawn(self.size)
+
+    def drawn(self, size: tuple[float, float]) -> str:
+        """The drawing at another size, inches; letters stay as large as the style has them."""
+        figure = new_figure(*size)
         self.draw(figure)
         return svg_of(figure, self.key)
 

@@ -8,10 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from workbench.report.actuator_section import actuator_section
 from workbench.report.budget import budget_section
 from workbench.report.campaign_figures import campaign_plot, error_over_plot
 from workbench.report.case_section import CaseView, case_view
 from workbench.report.error_sections import claims_section, worst_section
+from workbench.report.good_section import good_section
 from workbench.report.load import Run, Series
 from workbench.report.manifest import FigureRecord, Manifest
 from workbench.report.pictures import film_of
@@ -62,8 +64,10 @@ def build_sections(run: Run) -> list[Section]:
             drawn[index] = error_over_plot(run, figure, keys[index])
     sections = [
         verdict_section(run),
+        good_section(run, anchors),
         claims_section(run),
         worst_section(run, anchors),
+        actuator_section(run, anchors),
         budget_section(run, anchors),
         cases_section(run, views),
         figures_section(run, drawn, anchors),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from workbench.campaign.changed import sentences
+from workbench.report.attention import attention
 from workbench.report.concluded import LOOKS, conclusion_of
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
@@ -20,6 +21,7 @@ def verdict_section(run: Run) -> Section:
     cases = _cases(len(run.manifest.cases))
     about = f"{model_text(run.manifest)}, {cases}, {tested} candidate{'s' if tested != 1 else ''}."
     context = {"status": status, "sentence": sentence, "about": about, "tables": [table]}
+    context["attention"] = attention(run)
     context["diagnosis"] = {name: found for name, found in run.manifest.diagnosis.items() if found.findings}
     return Section("verdict", "Verdict", "verdict", context)
 

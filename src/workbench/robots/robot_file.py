@@ -20,6 +20,7 @@ from workbench.data_files import bundled
 from workbench.documents import Form, read_toml, shorten
 from workbench.errors import SpecError, WorkbenchError, did_you_mean
 from workbench.mjcf.setup import Setup
+from workbench.robots.actuators import ActuatorSpec, check_joints
 from workbench.robots.parameters import Bar, ParameterInfo, ParameterTable, Target
 from workbench.robots.places import kind_of, meaning_of, parse_place
 from workbench.schema import Finite, Name, Strict
@@ -123,12 +124,17 @@ class RobotSpec(Strict):
     """body on a free joint that is held where it is drawn"""
     formulas: list[str] = Field(default_factory=list)
     limits: dict[str, Range] = Field(default_factory=dict)
+    actuators: dict[str, ActuatorSpec] = Field(default_factory=dict)
+    """what the actuators can give, by joint; a run says by how much it is too little"""
     groups: dict[Identifier, Annotated[list[str], Field(min_length=1)]] = Field(default_factory=dict)
     parameters: dict[Identifier, ParameterSpec] = Field(default_factory=dict)
     bars: list[BarSpec] = Field(default_factory=list)
 
 
-FORM = Form(RobotSpec, sections={"platform": PlatformSpec, "parameters": ParameterSpec, "bars": BarSpec})
+FORM = Form(
+    RobotSpec,
+    sections={"platform": PlatformSpec, "parameters": ParameterSpec, "bars": BarSpec, "actuators": ActuatorSpec},
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,5 +343,6 @@ def read_robot_file(path: Path, shown: str = "", builtin: bool = False) -> Robot
         low, high = spec.limits[joint]
         if not low < high:
             raise SpecError(f"{shown}: limits.{joint} = {low:g} to {high:g}; the first must be below the second")
+    check_joints(spec.actuators, spec.actuated, shown)
     _ = found.model, found.formulas, found.table
     return found

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.campaign.actuators import limits_of
 from workbench.campaign.cases import base_robot, resolve_cases
 from workbench.campaign.compare import compute_case
 from workbench.campaign.evidence import Effort
+from workbench.campaign.good import check_asked
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate, full_names, load_candidates, with_rows
 from workbench.sweep.evaluate import Context, evaluate, series_bytes
@@ -43,6 +45,10 @@ class Estimate:
     tried: int = 0
     tried_filtered: int = 0
     tried_failed: int = 0
+    limited: tuple[str, ...] = ()
+    """joints whose actuators have limits to be held against; of a sweep none"""
+    measured: tuple[str, ...] = ()
+    """formulas without a bound, which a wanted accuracy is held against"""
 
 
 def estimate(
@@ -123,6 +129,7 @@ def _of_cases(
     users: Sequence[UserCandidate],
     only: Sequence[str],
 ) -> Estimate:
+    check_asked(campaign, str(file))
     cases = resolve_cases(campaign, file, model, tuple(only), settings, (), users)
     samples = sum(len(case.motion.t) for case in cases)
     short = min(cases, key=lambda case: len(case.motion.t))
@@ -130,4 +137,6 @@ def _of_cases(
     result = compute_case(campaign, short, effort)
     seconds = (time.perf_counter() - begun) * len(cases)
     size = len(series_bytes(result)) * samples / len(short.motion.t)
-    return Estimate(len(cases), samples, seconds, 1, size, size, tried=1)
+    limits = limits_of(campaign, cases[0].robot, str(file))
+    asked = tuple(f"{one.name} against {one.reference}" for one in campaign.candidate if one.bound is None)
+    return Estimate(len(cases), samples, seconds, 1, size, size, tried=1, limited=tuple(limits), measured=asked)

@@ -70,6 +70,7 @@ def verdict_section(run: SweepRun) -> Section:
         "sentence": sentence[:1].upper() + sentence[1:],
         "about": about,
         "tables": [outcomes, candidates_table(run.manifest)],
+        "attention": [],
         "diagnosis": {},  # of a formula that fails in a sweep, `workbench diagnose` tells more, on one of its cases
     }
     return Section("verdict", "Verdict", "verdict", context)
