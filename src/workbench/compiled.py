@@ -63,6 +63,14 @@ def inlined(function: Callable[..., Any]) -> Any:
     return _cached(function, {"forceinline": True})
 
 
+def merged(function: Callable[..., Any]) -> Any:
+    """A part of a kernel that is written into its caller before that is compiled, and never compiled alone.
+
+    What takes many arrays is costly to call for the compiler: handing sixty over takes seconds to compile.
+    """
+    return njit(inline="always", **OPTIONS)(function)
+
+
 def _cached(function: Callable[..., Any], more: dict[str, Any]) -> Any:
     try:
         dispatcher = njit(cache=True, **OPTIONS, **more)(function)

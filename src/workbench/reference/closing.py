@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.compiled import compiled, inlined
+from workbench.compiled import compiled, merged
 from workbench.reference.kernels import integrate, keep_if_better
 from workbench.reference.kinematics import Kinematics, Places, place, room
 from workbench.reference.linear import factor, solved
@@ -106,13 +106,14 @@ def bench(mechanism: Mechanism) -> Bench:
         array.flags.writeable = False
     return Bench(
         places, seen, np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros((nv, na)),
-        np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros(2, dtype=np.int64), np.zeros((m, nv)), np.zeros((m, 2 * p)), np.zeros((p, p)), np.zeros(m),
+        np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros(2, dtype=np.int64),
+        np.zeros((m, nv)), np.zeros((m, 2 * p)), np.zeros((p, p)), np.zeros(m),
         np.zeros((m, p + na + 1)), np.zeros(p), np.zeros(p, dtype=np.int64), np.zeros(p), np.zeros(nv), np.zeros(nv),
         np.zeros(1), np.zeros((4, na)),
     )  # fmt: skip
 
 
-@inlined
+@merged
 def _factored(passive, actuated, jacobian, residual, a, beta, order):  # type: ignore[no-untyped-def]
     """Factor the passive columns of the Jacobian, the actuated ones and the residual along; returns the rank."""
     p, na = passive.shape[0], actuated.shape[0]
@@ -125,7 +126,7 @@ def _factored(passive, actuated, jacobian, residual, a, beta, order):  # type: i
     return factor(a, beta, order)
 
 
-@inlined
+@merged
 def _noted(passive, actuated, a, order, found, x, tangent, facts):  # type: ignore[no-untyped-def]
     """Velocities per actuated velocity, rank, condition and weakest freedom, from the last factor."""
     p, na = passive.shape[0], actuated.shape[0]
@@ -181,7 +182,7 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     w.facts[0] = w.best[0]
 
 
-@inlined
+@merged
 def _along(tangent, rates, out):  # type: ignore[no-untyped-def]
     for d in range(tangent.shape[0]):
         value = 0.0
@@ -190,7 +191,7 @@ def _along(tangent, rates, out):  # type: ignore[no-untyped-def]
         out[d] = value
 
 
-@inlined
+@merged
 def _length(values, weights):  # type: ignore[no-untyped-def]
     squared = 0.0
     for d in range(values.shape[0]):
@@ -198,35 +199,21 @@ def _length(values, weights):  # type: ignore[no-untyped-def]
     return math.sqrt(squared)
 
 
-@inlined
+@merged
 def _copy(values, out):  # type: ignore[no-untyped-def]
     """Loops: assigning a slice takes numba seconds to compile."""
     for i in range(out.shape[0]):
         out[i] = values[i]
 
 
-@inlined
+@merged
 def _copy_rows(values, out):  # type: ignore[no-untyped-def]
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = values[i, j]
 
 
-@compiled
-def _jacobian(mechanism, w, qpos, first):  # type: ignore[no-untyped-def]
-    """Put the columns of a closed configuration that are solved for into ``Bench.both``, from column *first*."""
-    kin, seen, columns = mechanism.kinematics, w.seen, mechanism.sides.columns
-    place(kin, qpos, w.places)
-    constraint_rows(
-        mechanism.closures, mechanism.joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat,
-        seen.anchors, w.jacobian, w.residual,
-    )  # fmt: skip
-    for i in range(w.both.shape[0]):
-        for j in range(columns.shape[0]):
-            w.both[i, first + j] = w.jacobian[i, columns[j]]
-
-
-@inlined
+@merged
 def _on_side(mechanism, w):  # type: ignore[no-untyped-def]
     """Whether the step from ``Bench.here`` to ``Bench.kept`` passes no singular pose, as `Continuation._on_side`."""
     before, after = w.sides[1], w.sides[0]
@@ -236,12 +223,21 @@ def _on_side(mechanism, w):  # type: ignore[no-untyped-def]
         return before == UNKNOWN or before == w.sides[0]
     if before == after and after != UNKNOWN:
         return True
-    _jacobian(mechanism, w, w.here, 0)
-    _jacobian(mechanism, w, w.kept, mechanism.sides.columns.shape[0])
+    kin, seen, columns = mechanism.kinematics, w.seen, mechanism.sides.columns
+    for first in (0, columns.shape[0]):
+        qpos = w.here if first == 0 else w.kept
+        place(kin, qpos, w.places)
+        constraint_rows(
+            mechanism.closures, mechanism.joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat,
+            seen.anchors, w.jacobian, w.residual,
+        )  # fmt: skip
+        for i in range(w.both.shape[0]):
+            for j in range(columns.shape[0]):
+                w.both[i, first + j] = w.jacobian[i, columns[j]]
     return not turned_over(w.both, mechanism.sides)
 
 
-@inlined
+@merged
 def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
     """Follow the straight line from ``Bench.ways[3]`` to *target* ``(na,)``; returns how much of it was gone, 0 to 1.
 
@@ -291,7 +287,7 @@ def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
     return done
 
 
-@inlined
+@merged
 def _bend(w, target, s, size):  # type: ignore[no-untyped-def]
     """Fill `Bench.bend` for the step to sample *s*, after one of length *size* or, for NaN, none; returns it."""
     na = target.shape[1]
