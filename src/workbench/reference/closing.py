@@ -18,7 +18,7 @@ from workbench.reference.kernels import integrate, keep_if_better
 from workbench.reference.kinematics import Kinematics, Places, place, room
 from workbench.reference.linear import factor, solved
 from workbench.reference.rows import constraint_rows
-from workbench.reference.sides import NO_SIDES, UNKNOWN, SideTable, side_of, turned_over
+from workbench.reference.sides import NO_SIDES, UNKNOWN, SideTable, same_side, side_of
 from workbench.reference.tables import ClosureTables
 
 NEAR, LINES, CHAIN = 0, 1, 2
@@ -80,8 +80,10 @@ class Bench(NamedTuple):
     sides: np.ndarray
     """``(2,)`` of the last closing, and here: on which side of their singular poses"""
     jacobian: FloatArray
-    both: FloatArray
-    """``(m, 2 p)`` for `turned_over`"""
+    before: FloatArray
+    """``(1, m, nv)``, as `after` and ``same (1,)`` for `same_side`"""
+    after: FloatArray
+    same: np.ndarray
     work: FloatArray
     residual: FloatArray
     a: FloatArray
@@ -107,7 +109,8 @@ def bench(mechanism: Mechanism) -> Bench:
     return Bench(
         places, seen, np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros((nv, na)),
         np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros(2, dtype=np.int64),
-        np.zeros((m, nv)), np.zeros((m, 2 * p)), np.zeros((p, p)), np.zeros(m),
+        np.zeros((m, nv)), np.zeros((1, m, nv)), np.zeros((1, m, nv)), np.zeros(1, dtype=np.bool_),
+        np.zeros((p, p)), np.zeros(m),
         np.zeros((m, p + na + 1)), np.zeros(p), np.zeros(p, dtype=np.int64), np.zeros(p), np.zeros(nv), np.zeros(nv),
         np.zeros(1), np.zeros((4, na)),
     )  # fmt: skip
@@ -170,7 +173,7 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
         if good:
             _noted(passive, actuated, w.a, w.order, found, x, w.tangent, w.facts)
             if w.sides[0] == UNKNOWN or rules.settles:  # the step to rounding does not change it
-                w.sides[0] = side_of(w.jacobian, w.a, found, mechanism.sides, w.work)
+                w.sides[0] = side_of(w.jacobian, found, mechanism.sides, w.work)
         if not again:
             break
         solved(w.a, w.order, found, w.a.shape[1] - 1, x)
@@ -216,25 +219,26 @@ def _copy_rows(values, out):  # type: ignore[no-untyped-def]
 @merged
 def _on_side(mechanism, w):  # type: ignore[no-untyped-def]
     """Whether the step from ``Bench.here`` to ``Bench.kept`` passes no singular pose, as `Continuation._on_side`."""
-    before, after = w.sides[1], w.sides[0]
-    if mechanism.sides.least == 0.0:
+    before, after, table = w.sides[1], w.sides[0], mechanism.sides
+    redundant = False
+    for block in range(table.least.shape[0]):
+        redundant |= table.least[block] > 0.0
+    if not redundant:
         if after == UNKNOWN:
             w.sides[0] = before
         return before == UNKNOWN or before == w.sides[0]
-    if before == after and after != UNKNOWN:
+    if (before == after and after != UNKNOWN) or w.facts[1] < table.columns.shape[0]:
         return True
-    kin, seen, columns = mechanism.kinematics, w.seen, mechanism.sides.columns
-    for first in (0, columns.shape[0]):
-        qpos = w.here if first == 0 else w.kept
+    kin, seen = mechanism.kinematics, w.seen
+    for second in range(2):
+        qpos, rows = (w.kept, w.after[0]) if second else (w.here, w.before[0])
         place(kin, qpos, w.places)
         constraint_rows(
             mechanism.closures, mechanism.joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat,
-            seen.anchors, w.jacobian, w.residual,
+            seen.anchors, rows, w.residual,
         )  # fmt: skip
-        for i in range(w.both.shape[0]):
-            for j in range(columns.shape[0]):
-                w.both[i, first + j] = w.jacobian[i, columns[j]]
-    return not turned_over(w.both, mechanism.sides)
+    same_side(w.before, w.after, table, w.work, w.same)
+    return w.same[0]
 
 
 @merged

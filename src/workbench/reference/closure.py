@@ -21,7 +21,7 @@ from workbench.reference.kinematics import is_covered, kinematics_of
 from workbench.reference.rows import constraint_rows
 from workbench.reference.sides import pattern_of
 from workbench.reference.structure import Structure
-from workbench.reference.tables import tables_of
+from workbench.reference.tables import Tables, tables_of
 from workbench.reference.tolerance import KEY, RANK
 
 CONFIRMED = 2.0
@@ -41,7 +41,8 @@ class LoopCloser(OrderedClosure):
         self.mechanism = self._mechanism() if compiled and is_covered(engine.model) else None
         self._home = self._close_home(structure.home_qpos[None, :].copy())
         self.home = self._home.qpos[0]
-        self._look_at_sides(self.jacobian(self.home), pattern_of(structure, self.joints[2]), structure.passive)
+        pattern, group = pattern_of(structure, self.joints[2])
+        self._look_at_sides(self.jacobian(self.home), pattern, group, structure.passive)
         if self.mechanism is not None:
             self.mechanism = self.mechanism._replace(sides=self._side_table)
         self.start = self.home[structure.actuated_qpos]
@@ -125,7 +126,7 @@ class LoopCloser(OrderedClosure):
         )
 
     def _solved(self, qpos: FloatArray) -> FloatArray:
-        return np.stack([self.jacobian(one) for one in qpos])[:, :, self._side_table.columns]
+        return loop_rows(self.engine, self.tables, qpos)
 
     @property
     def at_home(self) -> Assembly:
@@ -234,3 +235,19 @@ def constraint_jacobian(
     jacobian, residual = np.zeros((structure.rows, poses.cdof.shape[1])), np.zeros(structure.rows)
     constraint_rows(tables.closures, tables.joints, qpos[0], *(array[0] for array in poses.tables), jacobian, residual)
     return jacobian, residual
+
+
+def loop_rows(engine: Engine, tables: Tables, qpos: FloatArray) -> FloatArray:
+    """Constraint Jacobians ``(k, m, nv)`` of configurations ``(k, nq)``, spin rows last."""
+    found = np.zeros((len(qpos), int(tables.closures.block_rows[-1]), engine.model.nv))
+    open_by = np.zeros(found.shape[1])
+
+    def block(evaluator: Evaluator, rows: slice) -> None:
+        evaluator.qpos[: rows.stop - rows.start] = qpos[rows]
+        poses = evaluator.place(np.arange(rows.stop - rows.start, dtype=np.int32))
+        for place, sample in enumerate(range(rows.start, rows.stop)):
+            here = (array[place] for array in poses.tables)
+            constraint_rows(tables.closures, tables.joints, qpos[sample], *here, found[sample], open_by)
+
+    engine.in_blocks(block, len(qpos))
+    return found
