@@ -195,10 +195,9 @@ def projection(  # type: ignore[no-untyped-def]
             value = 0.0
             for d in range(nv):
                 value += jac[i, d] * qvel[s, d]
-            worst = max(worst, abs(value))
-            open_by = max(open_by, abs(res[i]))
-            if math.isnan(res[i]):
-                open_by = math.inf
+            # a maximum passes over what is no number
+            worst = math.inf if math.isnan(value) else max(worst, abs(value))
+            open_by = math.inf if math.isnan(res[i]) else max(open_by, abs(res[i]))
         closure_residual[s], velocity_residual[s] = open_by, worst
         _along(tangent[s], qdd[s], qacc[s])
         body_motion(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], v, acc)
@@ -215,7 +214,7 @@ def projection(  # type: ignore[no-untyped-def]
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
         worst = 0.0
         for i in range(m):
-            worst = max(worst, abs(rates[i]))
+            worst = math.inf if math.isnan(rates[i]) else max(worst, abs(rates[i]))
         acceleration_residual[s] = worst
         # generalized force of the motion
         for d in range(nv):

@@ -30,7 +30,7 @@ from workbench.reference.platform_closure import PlatformCloser
 from workbench.reference.platform_side import PlatformSide
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
-from workbench.reference.result import Mobility, ReferenceResult
+from workbench.reference.result import Mobility, ReferenceResult, refuse_overflow
 from workbench.reference.structure import Structure, structure_of
 from workbench.reference.tolerance import few_digits_note, rank_of
 from workbench.robots.load import LoadedModel, load_model
@@ -261,6 +261,7 @@ class MujocoReference(PlatformSide):
         # beyond this rate MuJoCo sets the state back; such samples are refused for their rates
         self._closer.confirm(np.where(np.abs(qvel).max(axis=1) < mujoco.mjMAXVAL, closure_residual, 0.0))
         self._refuse_singular(q, qd, assembly.rank, velocity_residual, assembly.weakest)
+        refuse_overflow("torques", tau, qd)
         if times is not None:
             refuse_jumps(times, structure, self._closer.joints, qpos, qvel, qacc)
         # in MuJoCo dry friction is a constraint, so neither bias nor passive forces hold it
