@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.collections import PolyCollection
+from matplotlib.patches import Polygon
 
 from test_report import JOINTS, make_run
 from workbench.report import build_report
@@ -56,10 +56,10 @@ def test_parts_are_stacked_from_zero_and_their_sum_is_the_torque(run: Run) -> No
         assert np.allclose(line.get_ydata(), torque, atol=1e-12)
         assert f"τ{joint.removeprefix('q')} [" in axes.get_ylabel()
         assert unit.split()[0] in axes.get_ylabel()
-        bands = [c for c in axes.collections if isinstance(c, PolyCollection)]
+        bands = [patch for patch in axes.patches if isinstance(patch, Polygon)]
         assert len(bands) == 2 * len(SHARES)
         # what goes up reaches as high as all that is positive at once, what goes down as low as all that is negative
-        heights = np.concatenate([path.vertices[:, 1] for band in bands for path in band.get_paths()])
+        heights = np.concatenate([band.get_path().vertices[:, 1] for band in bands])
         parts = [share * torque for share in SHARES.values()]
         assert heights.max() == pytest.approx(max(sum(np.maximum(p, 0.0) for p in parts)))
         assert heights.min() == pytest.approx(min(sum(np.minimum(p, 0.0) for p in parts)))

@@ -272,6 +272,13 @@ def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any, good: 
     return _laid_out(title, rows, names, show, good, case_above=True)
 
 
+def _force(joint: str, rows: list[Row]) -> str:
+    """Name the generalized force of a joint with its unit: ``tau2 [N m]`` of q2."""
+    unit = next((row.unit for row in rows if row.joint == joint), "")
+    number = joint.removeprefix("q")
+    return (f"tau{number}" if number.isdigit() else f"tau {joint}") + (f" [{unit}]" if unit else "")
+
+
 def _laid_out(
     title: str, rows: list[Row], joints: Iterable[str], show: Any, good: float | None, *, case_above: bool
 ) -> Table:
@@ -282,7 +289,7 @@ def _laid_out(
     for column in (["candidate"] if case_above else ["case", "candidate"]) + ["MuJoCo model"]:
         table.add_column(column, overflow="fold")
     for joint in joints:
-        table.add_column(joint, justify="right", no_wrap=True)
+        table.add_column(_force(joint, rows), justify="right", no_wrap=True)
     if len(bounds) > 1:
         table.add_column("bound", justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)

@@ -57,7 +57,7 @@ def run(
         bool,
         typer.Option(
             "--replace",
-            help="Replace an earlier run of another robot, of other cases or candidates, once this is done.",
+            help="Replace an earlier run of another robot, other cases or candidates, or of more evidence.",
         ),
     ] = False,
     good: Annotated[
@@ -109,7 +109,7 @@ def run(
         raise SpecError(f"{campaign}: --good {good:g}: a sweep counts its designs by sweep.good of the campaign")
     spec = with_good(spec, good)
     if dry_run:
-        print_dry_run(spec, file, model, values, effort, jobs, candidates or (), only or ())
+        print_dry_run(spec, file, model, values, effort, jobs, candidates or (), only or (), keep_going)
         return
     if sweep:
         try:

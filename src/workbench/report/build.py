@@ -183,6 +183,7 @@ def html_page(template: str, sections: Sequence[Section], head: Mapping[str, Any
         **head,
         sections=bodies,
         style=Markup(style + sheet.rules),
+        shapes=Markup(sheet.shapes),
         script=Markup(script),
         script_hash=f"sha256-{digest}",
     )
