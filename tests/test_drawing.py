@@ -67,6 +67,7 @@ def test_what_the_second_has_drawn_the_first_does_not_draw(tmp_path: Path) -> No
     assert [plot.svg for plot in made] == [plot.svg for plot in alone]
     assert counts[0] == (0, 20)
     assert counts == sorted(counts)
+    assert counts[-1] == (20, 20)
 
 
 def ends(*_: Any) -> None:
