@@ -196,13 +196,15 @@ class _Search:
         return sorted((n for n in looked if n.whole is not None), key=_rank, reverse=True)
 
     def _suspects(self, node: Node) -> list[int]:
-        """Lines whose edits together move all that is wrong, those that move least of what is right first."""
-        wrong, moves = ~node.look.base, dict[int, np.ndarray]()
+        """Lines whose edits together move all that is wrong, those first of which one moves just that."""
+        wrong, moves, nearest = ~node.look.base, dict[int, np.ndarray](), dict[int, int]()
         for looked in self._looked[node.text]:
             moved = ~(np.abs(looked.look.found - node.look.found).max(axis=1) <= NOTHING * self._paper.floors)
-            moves[looked.edit.line] = moves.get(looked.edit.line, False) | moved
+            line = looked.edit.line
+            moves[line] = moves.get(line, False) | moved
+            nearest[line] = min(nearest.get(line, moved.size), int((moved != wrong).sum()))
         lines = [line for line, moved in moves.items() if not (wrong & ~moved).any()]
-        return sorted(lines, key=lambda line: (int((moves[line] & ~wrong).sum()), line))
+        return sorted(lines, key=lambda line: (nearest[line], line))
 
     def _telling(self, node: Node, nodes: list[Node]) -> list[Node]:
         """Those that are right in the exam, too, that the source before is most wrong in."""
