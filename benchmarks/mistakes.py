@@ -174,6 +174,7 @@ class Bench:
             if edit.kind in KINDS:
                 self.by_kind[edit.kind].append(edit)
         self.lines, self.groups = lines, groups
+        self.known: dict[Any, bool] = {}
         self.redrawn = 0
 
     def truth(self, subject):
@@ -198,6 +199,24 @@ class Bench:
             return None
         return entries, shares
 
+    def alone(self, edit, folder: Path) -> bool:
+        """Whether an edit changes a torque by itself."""
+        if edit not in self.known:
+            subject = self.subject_of(edit.apply(self.text), folder)
+            self.known[edit] = subject is not None and self.truth(subject) is not None
+        return self.known[edit]
+
+    def subject_of(self, text: str, folder: Path):
+        """The same robot with another text; None where that does not load."""
+        path = folder / "planted.py"
+        path.write_text(text)
+        try:
+            users = load_candidates([path])
+            self.subject.case.robot.offer({u.name: u.as_candidate() for u in users if u.name == self.candidate})
+            return Warm.of(self.subject, self.memory)
+        except (WorkbenchError, SyntaxError):
+            return None
+
     def planted(self, folder: Path, at_once: int):
         """A subject with so many mistakes, their kinds and lines; its truth."""
         for _ in range(200):
@@ -205,7 +224,7 @@ class Bench:
             for _ in range(at_once):
                 kind = self.rng.choice([k for k in KINDS if self.by_kind[k]])
                 edit = self.rng.choice(self.by_kind[kind])
-                if edit.line in lines:
+                if edit.line in lines or (at_once > 1 and not self.alone(edit, folder)):
                     break
                 old = self.text.splitlines()
                 new = edit.apply(self.text).splitlines()
@@ -219,16 +238,10 @@ class Bench:
                 kinds.append(WHAT[kind])
             if len(lines) < at_once:
                 continue
-            path = folder / "planted.py"
-            path.write_text(text)
-            try:
-                users = load_candidates([path])
-                case = self.subject.case
-                case.robot.offer({u.name: u.as_candidate() for u in users if u.name == self.candidate})
-                subject = Warm.of(self.subject, self.memory)
-                truth = self.truth(subject)
-            except (WorkbenchError, SyntaxError):
+            subject = self.subject_of(text, folder)
+            if subject is None:
                 continue
+            truth = self.truth(subject)
             if truth is None:
                 self.redrawn += 1
                 continue
@@ -306,7 +319,7 @@ def main() -> None:
     search.Supervisor = InProcess
     search.time = SimpleNamespace(monotonic=time.process_time)  # other processes do not shorten a search
     warm()
-    warnings.filterwarnings("ignore", category=RuntimeWarning)
+    warnings.simplefilter("ignore")
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

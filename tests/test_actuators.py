@@ -14,7 +14,7 @@ from scipy.integrate import quad
 import workbench as wb
 from robots import MODEL, random_changes
 from small_campaign import SMALL, Workbench
-from workbench.campaign.actuators import answer, margins, shortfalls, worst_of
+from workbench.campaign.margins import answer, margins, shortfalls, worst_of
 from workbench.demand import Demand, demand_of
 from workbench.errors import SpecError
 from workbench.report.attention import attention

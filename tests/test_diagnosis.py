@@ -6,13 +6,16 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import workbench as wb
 from small_campaign import Workbench
+from workbench.diagnosis.edits import Edit
 from workbench.diagnosis.entries import WRONG_MARK, Entry, floors_of, ratio_of, simple
 from workbench.diagnosis.examine import diagnose_subject
 from workbench.diagnosis.paper import lines_run, make_paper, splitting_of
@@ -21,7 +24,7 @@ from workbench.diagnosis.probes import ask, choose_poses, make_plan
 from workbench.diagnosis.result import Diagnosis
 from workbench.diagnosis.search import search_mends
 from workbench.diagnosis.surface import subjects, write_mended
-from workbench.diagnosis.trial import FIRST, Setup, Task, code_of
+from workbench.diagnosis.trial import FIRST, Looks, Setup, Task, code_of
 
 EXAMPLES = ("delta", "fourbar", "fivebar", "bricard", "orthoglide")
 
@@ -229,6 +232,24 @@ def test_an_edit_that_mends_everything_scores_complete(repository: Path, tmp_pat
     assert len(lines) > 20
 
 
+def test_edits_are_looked_at_as_files_where_two_names_share_one_array(repository: Path, tmp_path: Path) -> None:
+    """Statement by statement, with copies, such a formula gives something else: that is noticed, and not used."""
+    old = "    return arm + (tangent * at_elbow)"
+    campaign, path = spoiled(repository, tmp_path, "delta", old, "    same = arm\n    same *= 0.5\n" + old)
+    subject = subjects(campaign, candidates=[path], candidate="exact")[0]
+    _, seen = diagnose_subject(subject)
+    paper, text = make_paper(subject, seen), path.read_text()
+    exam = replace(paper.exams[0], values=SimpleNamespace(**vars(subject.values({}))))
+    looks = Looks(replace(paper, exams=(exam,)))
+    assert looks.recorded(text) is None
+    place = text.index("0.5")
+    found = looks.score(text, Edit(place, place + 3, "1.0", 0, 1))
+    assert found is not None
+    assert found.base.all()
+    plain = looks.recorded((repository / "examples" / "delta" / "delta.py").read_text())
+    assert plain is not None
+
+
 @pytest.mark.long
 def test_the_search_finds_the_lost_factor(repository: Path, tmp_path: Path) -> None:
     campaign, path = spoiled(repository, tmp_path, "delta", "+ p.ma / 2 * (tangent", "- p.ma / 2 * (tangent")
@@ -430,3 +451,31 @@ def test_sources_compiled_statement_by_statement_are_the_same() -> None:
     assert [a is b for a, b in zip(first, second, strict=True)].count(False) == 1
     with pytest.raises(SyntaxError):
         code_of("def broken(:", "file.py")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "mistakes",
+    [
+        {"centre = elbow - p.r": "centre = elbow + p.r", "x = centre[:, 0] + middle": "x = centre[:, 0] - middle"},
+        {"p.Ia + p.ma * p.a**2 / 4": "p.Ia - p.ma * p.a**2 / 4", "cross * elbow + (far": "cross * elbow - (far"},
+        pytest.param({"near * elbow + cross * x[:, None] + (near": "near * elbow + (near"}, marks=pytest.mark.long),
+    ],
+    ids=["each spoils everything", "in parts of their own", "a term is missing"],
+)
+def test_mistakes_are_put_back_one_after_the_other(repository: Path, tmp_path: Path, mistakes: dict[str, str]) -> None:
+    home, path = repository / "examples" / "delta", tmp_path / "delta.py"
+    text = (home / "delta.py").read_text(encoding="utf-8")
+    for right, wrong in mistakes.items():
+        assert text.count(right) == 1
+        text = text.replace(right, wrong)
+    path.write_text(text, encoding="utf-8")
+    subject = subjects(home / "delta.toml", candidates=[path], candidate="exact")[0]
+    _, seen = diagnose_subject(subject)
+    found, notes = search_mends(subject, seen, 600.0, 1)
+    steps = sorted({s.step for s in found})
+    assert steps == list(range(1, len(mistakes) + 1)), notes
+    assert found[-1].left == 0
+    mended = tmp_path / "mended.py"
+    mended.write_text(next(s for s in found if s.step == steps[-1]).text, encoding="utf-8")
+    assert diagnosed(home / "delta.toml", mended, "exact").right

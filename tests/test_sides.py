@@ -110,7 +110,8 @@ def test_two_loops_that_pass_their_near_meetings_at_once(
 
         def undivided(*arguments: np.ndarray) -> sides.SideTable:
             table = whole(*arguments)
-            return table._replace(starts=np.array([0, len(table.rows)]))
+            one = np.array([0, len(table.rows)])
+            return table._replace(starts=one, group_starts=np.array([0, len(table.group_rows)]), least=np.full(1, 1e-9))
 
         monkeypatch.setattr(continuation, "side_table", undivided)
         monkeypatch.setattr(
@@ -199,7 +200,7 @@ def test_rows_that_turn_over_where_the_mechanism_does_not(
 ) -> None:
     """A four-bar whose plane is turned about its ground: the rows chosen at home hold nothing a quarter turn on."""
     if spoiled:
-        monkeypatch.setattr(continuation, "same_side", lambda before, *_: np.full(len(before), spoiled == "always"))
+        monkeypatch.setattr(continuation, "same_side", lambda *arrays: arrays[-1].fill(spoiled == "always"))
     wrong = refused = 0
     model = FourBar()
     model.coupler, model.rocker = 0.200001, 0.2

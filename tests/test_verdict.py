@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from workbench.campaign.candidate_spec import CandidateSpec
+from workbench.campaign.changed import Change
+from workbench.campaign.changes import Changes
 from workbench.campaign.claims import judge_claims
 from workbench.campaign.evidence import Evidence, check_engines
 from workbench.campaign.spec import Campaign, CaseSpec, ClaimSpec
@@ -162,6 +164,75 @@ def judged(kind: str, claimed: float, within: float = 0.0, **measure: object) ->
     (found,) = judge_claims(campaign, {"x", "y"}, rows, FACTS, {}, None)  # type: ignore[arg-type]
     assert (found["id"], found["claimed"], found["kind"], found["within"]) == ("c", claimed, kind, within)
     return found["measured"], found["holds"]
+
+
+CLAIM = ClaimSpec.model_validate(
+    {"id": "c", "text": "t", "source": "s", "kind": "upper", "claimed": 1.0, "note": "as printed", "unit": "1"}
+    | {"measure": {"case": "one", "quantity": "peak_error"}}
+)
+
+
+def judged_claim(claim: ClaimSpec = CLAIM, *, kind: str = "verification", **about: object) -> dict[str, object]:
+    row = SimpleNamespace(
+        kind=kind, case="one", candidate="x", reference="lumped", joint="q1", peak_error=0.5, rms_error=0.1
+    )
+    campaign = Campaign.model_construct(claim=[claim])
+    robots, changes = about.get("robots", {}), about.get("changes", Changes())
+    return judge_claims(campaign, {"x"}, [row], FACTS, robots, changes)[0]  # type: ignore[list-item,arg-type]
+
+
+def test_a_claim_about_this_robot_says_nothing_of_others() -> None:
+    found = judged_claim()
+    assert (found["holds"], found["measured"], found["not_about"], found["note"]) == (True, 0.5, "", "as printed")
+
+
+@pytest.mark.parametrize("kind", ["contrast", "recorded"])
+def test_no_claim_is_judged_by_contrasts_or_recorded_torques(kind: str) -> None:
+    assert judged_claim(kind=kind)["measured"] is None
+
+
+class Table:
+    """Parameters of which each stands for itself."""
+
+    @staticmethod
+    def changed(values: dict[str, float], settings: dict[str, float]) -> dict[str, float]:
+        return values | settings
+
+
+def robot_of(**values: float) -> SimpleNamespace:
+    return SimpleNamespace(values=values, description=SimpleNamespace(table=Table))
+
+
+OTHER_ARM = Change("a", "m", 0.3, 0.4, "--set", ("one",))
+
+
+@pytest.mark.parametrize(
+    ("named", "values", "changes", "not_about"),
+    [
+        # the claim names its own payload: about a robot that carries it, and about no other
+        ({"m": 2.0}, {"m": 2.0, "a": 0.3}, Changes(), ""),
+        ({"m": 2.0}, {"m": 1.0, "a": 0.3}, Changes(), "m is 1, not 2"),
+        ({"m": 2.0}, {"m": 2.0, "a": 0.4}, Changes(parameters=(OTHER_ARM,)), "a is 0.4, not 0.3"),
+        ({"m": 2.0}, {"m": 1.0, "a": 0.4}, Changes(parameters=(OTHER_ARM,)), "m is 1, not 2, a is 0.4, not 0.3"),
+        # a model of another name is another robot, whatever its numbers
+        ({"m": 2.0}, {"m": 2.0, "a": 0.3}, Changes("the model is other.xml"), "the model is other.xml"),
+        ({}, {"m": 1.0, "a": 0.3}, Changes(), ""),
+        ({}, {"m": 1.0, "a": 0.4}, Changes(parameters=(OTHER_ARM,)), Changes(parameters=(OTHER_ARM,)).why_not("one")),
+    ],
+)
+def test_a_claim_is_about_the_robot_that_it_names(
+    named: dict[str, float], values: dict[str, float], changes: Changes, not_about: str
+) -> None:
+    claim = CLAIM.model_copy(update={"parameters": named})
+    found = judged_claim(claim, robots={"one": robot_of(**values)}, changes=changes)
+    assert found["not_about"] == not_about
+    assert (found["holds"], found["note"]) == ((None, "") if not_about else (True, "as printed"))
+
+
+def test_a_bound_that_bounds_nothing_is_refused() -> None:
+    CandidateSpec(name="x", reference="lumped", bound=1e6)
+    with pytest.raises(ValueError, match="less than or equal to 1000000"):
+        CandidateSpec(name="x", reference="lumped", bound=1.01e6)
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from workbench.campaign.actuators import answer, shortfalls
-from workbench.campaign.changed import ANOTHER, Change, sentences
+from workbench.campaign.changed import ANOTHER, Change, not_known, sentences
 from workbench.campaign.compare import Row
 from workbench.campaign.conclusion import (
     FAILED,
@@ -28,6 +27,7 @@ from workbench.campaign.conclusion import (
 )
 from workbench.campaign.good import NO, WORDS, YES, answers, good_enough
 from workbench.campaign.good import UNDECIDED as UNDECIDED_ANSWER
+from workbench.campaign.margins import answer, shortfalls
 from workbench.campaign.not_driven import NOT_DRIVEN
 from workbench.campaign.run import Outcome
 from workbench.campaign.verdict import (
@@ -189,7 +189,8 @@ def print_outcome(outcome: Outcome) -> None:
 
 def _print_attention(outcome: Outcome) -> None:
     """Print what changes no verdict and still has to be looked at: accuracy that was asked for, actuators too small."""
-    unknown = [name for name, case in outcome.manifest["cases"].items() if case["status"] == NOT_DRIVEN]
+    cases = outcome.manifest["cases"].items()
+    unknown = not_known([name for name, case in cases if case["status"] == NOT_DRIVEN])
     for found in answers(outcome.rows, outcome.manifest["good"], unknown):
         out.print(Text(found.sentence, style=ANSWERS[found.answer]), soft_wrap=True)
     held = outcome.margins

@@ -100,10 +100,11 @@ def dry_run(
     jobs: int | None,
     candidates: Sequence[str | Path] = (),
     only: Sequence[str] = (),
+    keep_going: bool = False,
 ) -> None:
     """Print what a run would take; nothing is written."""
     check_engines(effort.engines)
-    found = estimate(campaign, file, model, settings, effort, jobs, candidates, only)
+    found = estimate(campaign, file, model, settings, effort, jobs, candidates, only, keep_going)
     out.print(Text(f"{campaign.name}: {found.cases} cases, {found.samples} samples"))
     workers = "worker" if found.jobs == 1 else "workers"
     out.print(Text(f"  time: about {duration(found.seconds)} with {found.jobs} {workers}"))
@@ -113,6 +114,8 @@ def dry_run(
         out.print(Text(f"  good: {100 * campaign.good:.3g} % is asked of {', '.join(found.measured)}"))
     if found.limited:
         out.print(Text(f"  actuators: limits of {', '.join(found.limited)} are held against every case"))
+    for line in found.left_out:
+        out.print(Text(f"  cannot be driven, left out: {line}"), soft_wrap=True)
     if campaign.sweep and not only:
         parts = [f"{found.tried_filtered} left out by the filter", f"{found.tried_failed} not passed"]
         out.print(Text(f"  of {found.tried} cases tried: {', '.join(parts)}"))

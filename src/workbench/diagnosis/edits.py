@@ -250,8 +250,14 @@ class _Walker:
             self._replace(node.right, f"{exponent - 1:g}", EXPONENT)
 
     def _squared(self, node: ast.expr) -> None:
-        if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
-            self._add(self.places.end(node), self.places.end(node), "**2", SQUARE, node.lineno)
+        end = self.places.end(node)
+        if isinstance(node, ast.BinOp) and not isinstance(node.op, ast.Pow):
+            if self.places.data[end : end + 1] != b")":
+                return
+            end += 1
+        elif not isinstance(node, ast.Name | ast.Attribute | ast.Subscript | ast.Call):
+            return
+        self._add(end, end, "**2", SQUARE, node.lineno)
 
     def _term(self, node: ast.expr) -> None:
         """What may be forgotten in front of a whole term: a minus, a factor."""
@@ -310,6 +316,8 @@ class _Walker:
                 self._attribute(node.func)
             elif not isinstance(node.func.value, ast.Name):
                 self._expression(node.func.value, node)
+            if self.places.text(end := self.places.end(node.func.value), end + 1) == ")":
+                self._squared(node.func.value)
         elif isinstance(node.func, ast.Name):
             self._name(node.func)
         arguments = node.args
@@ -319,11 +327,14 @@ class _Walker:
             self._add(first, last, f"{two}, {one}", SWAP, node.lineno)
         for argument in arguments:
             if name in SHAPES:
-                if isinstance(argument, ast.List | ast.Tuple) or not isinstance(argument, ast.Constant):
+                number = argument.operand if isinstance(argument, ast.UnaryOp) else argument
+                if not isinstance(number, ast.Constant):
                     self._expression(argument, node)
                 continue
             if name not in ("sin", "cos"):
                 self._term(argument)
+                if not isinstance(argument, ast.BinOp):
+                    self._squared(argument)
             self._expression(argument, node)
 
 

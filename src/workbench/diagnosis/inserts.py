@@ -80,6 +80,8 @@ class _Inserts:
             return isinstance(node.op, ast.Pow)
         if isinstance(node, ast.Name):
             return isinstance(node.ctx, ast.Load) and node.id not in ("np", "p")
+        if isinstance(node, ast.Constant):
+            return isinstance(node.value, complex)
         if isinstance(node, ast.Call):
             return _called(node) not in SHAPES
         return isinstance(node, ast.Subscript) or (isinstance(node, ast.Attribute) and _is_value(node))

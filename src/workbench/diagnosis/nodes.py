@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from workbench.diagnosis.edits import Edit
 from workbench.diagnosis.trial import Score
@@ -13,13 +14,21 @@ from workbench.diagnosis.trial import Score
 class Node:
     """An edited source and the way to it."""
 
-    text: str
+    origin: str
+    """the text before all edits"""
     look: Score
     """on the robot as it is"""
     chain: tuple[tuple[Edit, str], ...] = ()
     """edits so far, each with the text that it was made on"""
     whole: Score | None = field(default=None)
     """on all exams, where it was looked at"""
+    broken: int = 0
+    """numbers of those that were right at the start and are no longer"""
+
+    @cached_property
+    def text(self) -> str:
+        """The source; made when it is asked for, since most nodes are looked at once and never again."""
+        return self.edit.apply(self.parent) if self.chain else self.origin
 
     @property
     def edit(self) -> Edit:
@@ -43,7 +52,7 @@ class Node:
 
     def after(self, edit: Edit, look: Score) -> Node:
         """The source with one more edit."""
-        return Node(edit.apply(self.text), look, (*self.chain, (edit, self.text)))
+        return Node(self.origin, look, (*self.chain, (edit, self.text)))
 
 
 def shifted(edit: Edit, done: Edit) -> Edit | None:
@@ -54,6 +63,14 @@ def shifted(edit: Edit, done: Edit) -> Edit | None:
         by = len(done.new.encode()) - (done.end - done.start)
         return replace(edit, start=edit.start + by, end=edit.end + by)
     return None
+
+
+def moved(edit: Edit, done: Iterable[Edit]) -> Edit | None:
+    """The same edit of a text in which others were made one after the other; None where it overlaps one."""
+    found: Edit | None = edit
+    for before in done:
+        found = shifted(found, before) if found is not None else None
+    return found
 
 
 def distinct(nodes: Iterable[Node]) -> list[Node]:

@@ -13,7 +13,7 @@ from workbench.arrays import FloatArray
 from workbench.diagnosis.examine import Examined
 from workbench.diagnosis.noise import SAFETY
 from workbench.diagnosis.parts import REST, Part, design, take_apart
-from workbench.diagnosis.probes import Plan, ask
+from workbench.diagnosis.probes import Plan
 from workbench.diagnosis.shares import reference_torques
 from workbench.diagnosis.subject import AFFINE, Parameter, Subject
 from workbench.diagnosis.trial import Exam, Paper
@@ -31,7 +31,6 @@ def make_paper(subject: Subject, seen: Examined) -> Paper:
     assert source is not None
     plan = seen.plan.at(POSES)
     splitting = splitting_of(plan, subject.takes_force)
-    start, _ = ask(plan, lambda q, qd, qdd, force: subject.formula(q, qd, qdd, force, {}))
     exams = [Exam(subject.values({}), plan.flat(), _parts(splitting, reference_torques(subject, plan, {})))]
     mixed = sum(label[0] == "mixed" for label in plan.labels)
     forces = len(splitting) - mixed - 3 if subject.takes_force else None
@@ -46,19 +45,19 @@ def make_paper(subject: Subject, seen: Examined) -> Paper:
             continue
     return Paper(
         str(source.file), source.candidate, subject.takes_force, splitting, seen.floors, tuple(exams),
-        _parts(splitting, start), _jacobian(subject, plan), forces, SAFETY * seen.noise,
+        _pulled(subject, plan), forces, SAFETY * seen.noise,
     )  # fmt: skip
 
 
-def _jacobian(subject: Subject, plan: Plan) -> FloatArray | None:
-    """The reference's J at the poses, from its response to forces; None where it cannot be inverted."""
+def _pulled(subject: Subject, plan: Plan) -> FloatArray | None:
+    """The inverse of J^T at the poses, from the reference's response to forces; None where there is none."""
     q, zero = plan.poses, np.zeros_like(plan.poses)
     rest = subject.torques_of_reference(q, zero, zero, np.zeros((len(q), 3)), {})
     rows = [rest - subject.torques_of_reference(q, zero, zero, np.zeros((len(q), 3)) + axis, {}) for axis in np.eye(3)]
     found = np.stack(rows, axis=1)
     if found.shape[2] != 3 or not np.isfinite(found).all() or np.linalg.cond(found).max() > SINGULAR:
         return None
-    return found
+    return np.asarray(np.linalg.inv(found.swapaxes(1, 2)))
 
 
 def _parts(splitting: FloatArray, tau: FloatArray) -> FloatArray:

@@ -152,7 +152,7 @@ class _Changed:
             for number, step in enumerate(program.steps):
                 if step.start <= edit.start and edit.end <= step.end:
                     lines = data[step.start : edit.start] + edit.new.encode() + data[edit.end : step.end]
-                    return number, compiled_statement(lines, step.line, self._tape._path), None
+                    return number, compiled_statement(lines, self._tape._path), None
         home = self._home
         text = data[home.start : edit.start] + edit.new.encode() + data[edit.end : home.end]
         made: Space = {}

@@ -19,7 +19,7 @@ from workbench.diagnosis.combine import groups_alike, masks, sums
 from workbench.diagnosis.edits import LIKELY, STAGES, Edit, edits_of
 from workbench.diagnosis.examine import Examined
 from workbench.diagnosis.inserts import inserts_of
-from workbench.diagnosis.nodes import Node, distinct, shifted
+from workbench.diagnosis.nodes import Node, distinct, moved
 from workbench.diagnosis.paper import groups_of, lines_run, make_paper, missing_in
 from workbench.diagnosis.result import Suggestion
 from workbench.diagnosis.subject import Subject
@@ -35,7 +35,16 @@ FULL = 40
 WHOLE = 400
 """The same, of edits after which the robot as it is is right."""
 
-MOST_INSERTS = 8000
+BROKEN = 10
+"""What an entry that was right and is no longer counts against those that became right."""
+
+MOST_ACCIDENTS = 6
+"""Sums that are right for this robot's numbers and no others, after which no more are looked at thoroughly."""
+
+WORSE_FIRST = 8
+"""Sources that got no better that are taken further before terms are put in, where most is wrong."""
+
+MOST_INSERTS = 6000
 
 STEPS = 6
 BATCH = 24
@@ -76,21 +85,25 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+Place = tuple[int, int, int, str]
+"""Of an edit, whatever other lines look like."""
+
+
 class _Search:
     def __init__(
         self, supervisor: Supervisor, paper: Paper, deadline: float, edits: Callable[[str], list[Edit]]
     ) -> None:
         self._supervisor, self._paper, self._deadline, self._edits = supervisor, paper, deadline, edits
-        self._moves: dict[tuple[int, int, int, str], np.ndarray] = {}
+        self._breaks: dict[str, dict[Place, np.ndarray]] = {}
         self._looked: dict[str, list[Node]] = {}
-        self._run: set[str] = set()
+        self._right: np.ndarray | None = None
         self.tried = 0
 
     def run(self, text: str, path: str) -> tuple[list[Suggestion], tuple[str, ...]]:
         started, whole = self.scores([text], FIRST)[0], self.scores([text], None)[0]
         if started is None or whole is None:  # it fails at all of these states; an edit may mend that
             started, whole = (nothing_right(self._paper, count) for count in (1, len(self._paper.exams)))
-        root = Node(text, started, whole=whole)
+        root, self._right = Node(text, started, whole=whole), whole.mask
         best = self._followed(root)
         notes = [f"{self.tried} edits tried."]
         if time.monotonic() > self._deadline:
@@ -105,45 +118,49 @@ class _Search:
 
     def _followed(self, root: Node) -> Node:
         """The best source that is found in time."""
-        best, better, worse, filled = root, [root], list[Node](), set[str]()
-        seen = {root.text}
+        best, better, worse, filled = root, [root], list[Node](), list[Node]()
+        seen, left = {root.text}, 0
         while (better or worse) and not best.complete and time.monotonic() < self._deadline:
             # the best source first; one that led nowhere gives way to the next best, at last to the least wrong
             climbing = bool(better)
-            if not climbing and best.text not in filled and best.text in self._looked:
-                node, climbing = best, True
-                filled.add(best.text)
-                found = self._inserted(best)
+            # where most is wrong two mistakes in kinematics hide each other; where little is, a term may be missing
+            hidden = 2 * best.look.base.sum() < best.look.base.size and len(worse) > max(0, left - WORSE_FIRST)
+            if not climbing and filled and not hidden:
+                node, climbing = filled.pop(), True
+                found = [n for n in self._inserted(node) if _key(n) > _key(best)]
             else:
                 node = better.pop(0) if climbing else worse.pop(0)
                 if node.whole is None:
                     self._fill([node])
                 found = self._expand(node, climbing)
+                if not found:  # tens of thousands of sources that led nowhere are not kept
+                    self._looked[node.text], self._breaks[node.text] = [], {}
+                if node is root or (climbing and node is best):
+                    filled.append(node)
             if found and _rank(found[0]) > _rank(best):
                 best = found[0]
             if len(node.chain) + 1 >= STEPS:
                 continue
-            gain = [n for n in distinct(found) if n.text not in seen and _key(n) > _key(node if climbing else root)][
-                :BEAM
-            ]
+            before = _key(node if climbing else root)[0]
+            gain = [n for n in distinct(found) if n.text not in seen and _key(n)[0] > before][:BEAM]
             seen |= {n.text for n in gain}
             better = sorted([*better, *gain], key=_rank, reverse=True)
             if node is root:
                 kept = [n for n in self._looked[node.text] if n.text not in seen and n.edit.kind in LIKELY]
                 worse = distinct_looks(sorted(kept, key=lambda n: n.look.key, reverse=True))
+                left = len(worse)
         return best
 
     def _expand(self, node: Node, thorough: bool) -> list[Node]:
         """Look at all edits of a source, and at the promising ones on all exams; best first."""
         made: dict[str, Edit] = {}
-        wrong = ~node.look.base
+        before = [self._breaks.get(text, {}) for _, text in node.chain]
         for edit in self._edits(node.text):
             place = edit.place(node.text)
-            moves = self._moves.get(place)
-            # a mend moves nothing that is right; what an edit moves was seen when it was tried first
-            if node.chain and moves is not None and place[0] not in node.lines and (moves & ~wrong).any():
-                continue
-            made.setdefault(edit.apply(node.text), edit)
+            # what was right, was broken by the edit when it was tried there, and is right still, would be broken again
+            seen = (breaks[place] for breaks in before if place in breaks) if place[0] not in node.lines else ()
+            if not any((broken & node.look.base).any() for broken in seen):
+                made.setdefault(edit.apply(node.text), edit)
         looked = self._looked[node.text] = []
         for kinds in STAGES if thorough else (LIKELY,):
             stage = self._look(node, [edit for edit in made.values() if edit.kind in kinds])
@@ -155,7 +172,7 @@ class _Search:
         else:
             looked = [*looked, *self._combined(node, looked)]
         looked = sorted(looked, key=lambda n: n.look.key, reverse=True)
-        self._fill([n for n in looked if thorough or n.look.key > node.look.key][:FULL])
+        self._fill([n for n in looked if thorough or n.look.key[0] > node.look.key[0]][:FULL])
         return sorted((n for n in looked if n.whole is not None), key=_rank, reverse=True)
 
     def _inserted(self, node: Node) -> list[Node]:
@@ -169,6 +186,8 @@ class _Search:
             if any(n.complete for n in right) or len(looked) > MOST_INSERTS:
                 break
         self._looked[node.text] += looked
+        if not any(n.complete for n in looked):
+            looked += self._combined(node, looked)
         self._fill(sorted((n for n in looked if n.look.key > node.look.key), key=_rank, reverse=True)[:FULL])
         return sorted((n for n in looked if n.whole is not None), key=_rank, reverse=True)
 
@@ -201,67 +220,73 @@ class _Search:
         wanted = ((self._paper.exams[0].parts - start) / floors).ravel()
         groups = groups_alike(effects)
         first = np.array([min(group, key=lambda i: (nodes[i].edit.kind, len(nodes[i].edit.new))) for group in groups])
-        made: dict[str, Node] = {}
+        alike = {id(nodes[i]): [nodes[j] for j in group] for group in groups for i in group}
+        made, accidents = dict[str, Node](), 0
         for mask, triples in masks(start.shape):
             small = effects[first][:, mask] if len(first) else np.zeros((0, 0))
             moving = np.flatnonzero(np.abs(small).max(axis=1, initial=0.0) > 0.0)
             for chosen in sums(small[moving], wanted[mask], triples):
-                numbers = [int(first[moving[i]]) for i in chosen]
-                joined = self._joined(node, [nodes[i] for i in numbers], nodes, groups)
-                if joined is not None:
-                    made.setdefault(joined.text, joined)
-            if any(n.look.base.all() for n in self._scored(made, FIRST)):
-                break
-        return self._scored(made, FIRST)
-
-    def _scored(self, made: dict[str, Node], exams: tuple[int, ...]) -> list[Node]:
-        """Those that run, with their looks."""
-        waiting = [n for n in made.values() if n.text not in self._run]
-        for n, score in zip(waiting, self.scores([n.text for n in waiting], exams), strict=True):
-            if score is None:
-                made.pop(n.text)
-            else:
-                n.look = score
-                self._run.add(n.text)
+                parts = [nodes[int(first[moving[i]])] for i in chosen]
+                joined = self._joined(node, parts, alike)
+                if joined is not None and joined.text not in made:
+                    self._scored([joined])
+                    made[joined.text] = joined
+                    if joined.look.base.all() and accidents < MOST_ACCIDENTS:
+                        others = [joined, *self._same_sums(node, joined, parts, alike)]
+                        made.update({n.text: n for n in others})
+                        if any(n.complete for n in others):
+                            return list(made.values())
+                        accidents += 1
         return list(made.values())
 
-    def _joined(self, node: Node, parts: list[Node], nodes: list[Node], groups: list[list[int]]) -> Node | None:
+    def _same_sums(self, node: Node, joined: Node, parts: list[Node], alike: dict[int, list[Node]]) -> list[Node]:
+        """The same with edits that do the same on the robot as it is, where other robots tell them apart."""
+        found, best, chosen = list[Node](), joined, list(parts)
+        self._fill([best])
+        for place in range(len(parts)):
+            if best.complete:
+                break
+            tries = [[*chosen[:place], other, *chosen[place + 1 :]] for other in alike[id(parts[place])][:FULL]]
+            made = [(one, self._joined(node, one, alike)) for one in tries]
+            others = [(one, n) for one, n in made if n is not None and n.text != best.text]
+            self._scored([n for _, n in others])
+            self._fill([n for _, n in others])
+            found += [n for _, n in others if n.whole is not None]
+            for one, n in others:
+                if n.whole is not None and _rank(n) > _rank(best):
+                    best, chosen = n, one
+        return found
+
+    def _scored(self, nodes: list[Node]) -> None:
+        """Run sources with several edits on the robot as it is; what does not run has nothing right."""
+        for n, score in zip(nodes, self.scores([n.text for n in nodes], FIRST), strict=True):
+            n.look = score or nothing_right(self._paper, 1)
+
+    def _joined(self, node: Node, parts: list[Node], alike: dict[int, list[Node]]) -> Node | None:
         """One source with several edits, the one first that mends most alone."""
-        parts = sorted(parts, key=lambda n: n.look.key, reverse=True)
         current, done = node, list[Edit]()
-        for part in parts:
-            edit: Edit | None = part.edit
-            for before in done:
-                edit = shifted(edit, before) if edit is not None else None
+        for part in sorted(parts, key=lambda n: n.look.key, reverse=True):
+            edit = moved(part.edit, done)
             if edit is None:
                 return None
             after = current.after(edit, part.look)
             if current is not node:
-                group = next(g for g in groups if any(nodes[i] is part for i in g))
-                moved = [self._moved(nodes[i].edit, done) for i in group]
+                others = [moved(n.edit, done) for n in alike[id(part)]]
                 known = self._looked.setdefault(current.text, [])
-                known += [after, *(current.after(e, part.look) for e in moved if e is not None and e != edit)]
+                known += [after, *(current.after(e, part.look) for e in others if e is not None and e != edit)]
             current = after
             done.append(edit)
         return current
 
-    @staticmethod
-    def _moved(edit: Edit, done: list[Edit]) -> Edit | None:
-        moved: Edit | None = edit
-        for before in done:
-            moved = shifted(moved, before) if moved is not None else None
-        return moved
-
     def _look(self, node: Node, edits: list[Edit]) -> list[Node]:
-        found = []
+        found, broken = [], self._breaks.setdefault(node.text, {})
         batches = [tuple(edits[first : first + BATCH]) for first in range(0, len(edits), BATCH)]
         answers = self._asked([Task((node.text,), FIRST, batch) for batch in batches])
         for batch, answer in zip(batches, answers, strict=True):
             for edit, score in zip(batch, answer or [None] * len(batch), strict=True):
                 if score is not None:
                     found.append(node.after(edit, score))
-                    if not node.chain:
-                        self._moves[edit.place(node.text)] = score.moved
+                    broken[edit.place(node.text)] = node.look.base & ~score.base
         return found
 
     def _fill(self, nodes: Sequence[Node]) -> None:
@@ -269,6 +294,8 @@ class _Search:
         waiting = [node for node in nodes if node.whole is None]
         for node, score in zip(waiting, self.scores([n.text for n in waiting], None), strict=True):
             node.whole = score
+            if score is not None and self._right is not None:
+                node.broken = int((self._right & ~score.mask).sum())
 
     def scores(self, texts: Sequence[str], exams: tuple[int, ...] | None) -> list[Score | None]:
         """Score texts in the workers, until the time is up; None for those that fail or are not reached."""
@@ -296,7 +323,8 @@ class _Search:
 
 
 def _key(node: Node) -> tuple[int, float]:
-    return (node.whole or node.look).key
+    right, total = (node.whole or node.look).key
+    return right - BROKEN * node.broken, total
 
 
 def _rank(node: Node) -> tuple[bool, int, float, int, int]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from types import CodeType
 
 RETURNED = "__returned__"
@@ -77,18 +76,18 @@ def functions_of(text: str, path: str) -> dict[str, Function]:
     }
 
 
-def compiled_statement(lines: bytes, line: int, path: str) -> CodeType:
-    """Compile the whole lines of one indented statement; what it returns is kept under `RETURNED`.
+def compiled_statement(lines: bytes, path: str) -> CodeType:
+    """Compile the whole lines of an indented statement that ran before; what it returns is kept under `RETURNED`.
 
     Raises
     ------
     SyntaxError
-        These are not the lines of one statement.
+        The text is no Python.
     """
-    body = ast.parse(b"if 1:\n" + lines, path).body
-    if len(body) != 1 or not isinstance(body[0], ast.If) or len(body[0].body) != 1:
-        raise SyntaxError("not one statement")
-    return _compiled(body[0].body[0], path)
+    bare = lines.lstrip()
+    if bare.startswith(b"return"):
+        lines = lines.replace(b"return", f"{RETURNED} =".encode(), 1)
+    return compile(b"if 1:\n" + lines, path, "exec")
 
 
 def _line_starts(data: bytes) -> list[int]:
@@ -188,9 +187,3 @@ def _compiled(statement: ast.stmt, path: str) -> CodeType:
         kept = ast.Assign([ast.Name(RETURNED, ast.Store())], value)
         statement = ast.copy_location(kept, statement)
     return compile(ast.fix_missing_locations(ast.Module([statement], [])), path, "exec")
-
-
-@lru_cache(maxsize=64)
-def known_functions(text: str, path: str) -> dict[str, Function]:
-    """`functions_of`, of the texts that were asked last."""
-    return functions_of(text, path)

@@ -59,10 +59,9 @@ class Paper:
     """``(na,)`` the joints' largest parts"""
     exams: tuple[Exam, ...]
     """the robot as it is first, then with parameters changed one by one"""
-    start: FloatArray
-    """``(parts, poses, na)`` of the first exam by the formula as it is"""
-    jacobian: FloatArray | None
-    """``(poses, 3, na)`` the reference's, where it is square and regular: errors are looked at per direction, too"""
+    pulled: FloatArray | None
+    """``(poses, 3, na)`` torques to forces at the platform, the inverse of J^T, where it is regular: errors are looked
+    at per direction, too"""
     forces: int | None
     """where among the parts the responses to the three components of the force begin"""
     noise: float
@@ -81,8 +80,6 @@ class Score:
     """``(parts, na)`` which entries are right for the robot as it is"""
     mask: np.ndarray
     """the same for all exams in a row"""
-    moved: np.ndarray
-    """``(parts, na)`` which are other than the unedited formula's"""
     complete: bool
     """all of them, in all exams"""
     behind: int
@@ -220,9 +217,8 @@ def judged(paper: Paper, answers: Sequence[FloatArray], exams: Sequence[Exam]) -
         total -= float(logs.sum())
         complete = complete and bool(good.all())
     base = masks[0].reshape(first.shape[0], -1)
-    moved = ~(np.abs(first - paper.start).max(axis=1) <= NOTHING * paper.floors)
     mask = np.concatenate(masks)
-    return Score(right, total, base, mask, moved, complete, _behind(paper, first), first, len(answers))
+    return Score(right, total, base, mask, complete, _behind(paper, first), first, len(answers))
 
 
 def nothing_right(paper: Paper, exams: int) -> Score:
@@ -233,14 +229,11 @@ def nothing_right(paper: Paper, exams: int) -> Score:
 
 def _behind(paper: Paper, found: FloatArray) -> int:
     """Count the numbers behind the entries that are right."""
-    jacobian = paper.jacobian
-    if jacobian is None or not np.isfinite(found).all():
+    if paper.pulled is None or not np.isfinite(found).all():
         return 0
-    inverse, wanted = np.linalg.inv(jacobian), paper.exams[0].parts
-    pushed = np.einsum(
-        "saj,psj->psa", inverse.swapaxes(1, 2), np.stack([found - wanted, wanted]).reshape(-1, *found.shape[1:])
-    )
-    gap, size = np.abs(pushed).max(axis=1).reshape(2, found.shape[0], -1)
+    wanted = paper.exams[0].parts
+    pushed = np.einsum("saj,qpsj->qpsa", paper.pulled, np.stack([found - wanted, wanted]))
+    gap, size = np.abs(pushed).max(axis=2)
     right = int((gap <= RIGHT * np.maximum(size, 1e-3 * size.max())).sum())
     if paper.forces is None:
         return right
@@ -306,7 +299,7 @@ class Looks:
         if text not in self._tapes:
             if len(self._tapes) >= MOST_TAPES:
                 self._tapes.pop(next(iter(self._tapes)))
-            self._tapes[text] = self._recorded(text)
+            self._tapes[text] = self.recorded(text)
         tape = self._tapes[text]
         if tape is None:
             return score(self._paper, edit.apply(text), FIRST)
@@ -327,7 +320,7 @@ class Looks:
 
         return bounded(call, ONE_EDIT_S)
 
-    def _recorded(self, text: str) -> Tape | None:
+    def recorded(self, text: str) -> Tape | None:
         """The text's run; None where going through it statement by statement does not give just what it gives."""
         paper = self._paper
         kept = [array.copy() for array in self._given]

@@ -18,7 +18,7 @@ from workbench.reference.kernels import integrate, newton_step
 from workbench.reference.rows import constraint_rows
 from workbench.reference.sides import pattern_of
 from workbench.reference.structure import Structure
-from workbench.reference.tables import tables_of
+from workbench.reference.tables import Tables, tables_of
 from workbench.reference.tolerance import KEY, RANK
 
 FREE_STEPS = 60
@@ -33,7 +33,8 @@ class LoopCloser(OrderedClosure):
         super().__init__(engine, structure)
         self._home = self._close_home(structure.home_qpos[None, :].copy())
         self.home = self._home.qpos[0]
-        self._look_at_sides(self.jacobian(self.home), pattern_of(structure, self.joints[2]), structure.passive)
+        pattern, group = pattern_of(structure, self.joints[2])
+        self._look_at_sides(self.jacobian(self.home), pattern, group, structure.passive)
         self.start = self.home[structure.actuated_qpos]
 
     def _close_home(self, home: FloatArray) -> Assembly:
@@ -85,7 +86,7 @@ class LoopCloser(OrderedClosure):
         )
 
     def _solved(self, qpos: FloatArray) -> FloatArray:
-        return np.stack([self.jacobian(one) for one in qpos])[:, :, self._side_table.columns]
+        return loop_rows(self.engine, self.tables, qpos)
 
     @property
     def at_home(self) -> Assembly:
@@ -167,3 +168,19 @@ def constraint_jacobian(
     jacobian, residual = np.zeros((structure.rows, poses.cdof.shape[1])), np.zeros(structure.rows)
     constraint_rows(tables.closures, tables.joints, qpos[0], *(array[0] for array in poses.tables), jacobian, residual)
     return jacobian, residual
+
+
+def loop_rows(engine: Engine, tables: Tables, qpos: FloatArray) -> FloatArray:
+    """Constraint Jacobians ``(k, m, nv)`` of configurations ``(k, nq)``, spin rows last."""
+    found = np.zeros((len(qpos), int(tables.closures.block_rows[-1]), engine.model.nv))
+    open_by = np.zeros(found.shape[1])
+
+    def block(evaluator: Evaluator, rows: slice) -> None:
+        evaluator.qpos[: rows.stop - rows.start] = qpos[rows]
+        poses = evaluator.place(np.arange(rows.stop - rows.start, dtype=np.int32))
+        for place, sample in enumerate(range(rows.start, rows.stop)):
+            here = (array[place] for array in poses.tables)
+            constraint_rows(tables.closures, tables.joints, qpos[sample], *here, found[sample], open_by)
+
+    engine.in_blocks(block, len(qpos))
+    return found

@@ -258,9 +258,9 @@ class Continuation(ABC):
         self.engine.in_blocks(lambda evaluator, _: results.append(self._newton(evaluator, qpos, aim)), 1)
         return results[0]
 
-    def _look_at_sides(self, rows: FloatArray, pattern: np.ndarray, columns: IntArray) -> None:
-        """From now on no step passes a singular pose; *rows* ``(m, nv)`` at home, and where they may not be zero."""
-        self._side_table = side_table(rows[:, columns], pattern[:, columns], columns)
+    def _look_at_sides(self, rows: FloatArray, pattern: np.ndarray, group: IntArray, columns: IntArray) -> None:
+        """From now on no step passes a singular pose; *rows* ``(m, nv)`` at home; *group* is the closure of each."""
+        self._side_table = side_table(rows[:, columns], pattern[:, columns], group, columns)
         self._home.side[:] = side_at(rows, columns, self._side_table)
 
     def _on_side(self, here: Assembly, rows: np.ndarray, closed: Assembly, wanted: np.ndarray) -> np.ndarray:
@@ -269,17 +269,20 @@ class Continuation(ABC):
         A configuration in a singular pose has no side and inherits the one that it was reached from.
         """
         before, after, table = here.side[rows], closed.side, self._side_table
-        if table.least == 0.0:
+        if not table.least.any():
             lost = after == UNKNOWN
             after[lost] = before[lost]
             square: np.ndarray = (before == UNKNOWN) | (before == after)
             return square
         # chosen rows may turn over among the others, where the mechanism does not
-        same: np.ndarray = (before == after) & (after != UNKNOWN)
+        lost = closed.rank < len(table.columns)  # in a singular pose, which is refused elsewhere
+        same: np.ndarray = ((before == after) & (after != UNKNOWN)) | lost
         doubtful = np.flatnonzero(wanted & ~same)
         if len(doubtful):
+            size, found = len(table.columns), np.zeros(len(doubtful), dtype=np.bool_)
             jacobians = self._solved(here.qpos[rows[doubtful]]), self._solved(closed.qpos[doubtful])
-            same[doubtful] = same_side(*jacobians, table)
+            same_side(*jacobians, table, np.empty((size, size)), found)
+            same[doubtful] = found
         return same
 
     def _nothing(self, samples: int, given: int) -> Assembly:
@@ -295,7 +298,7 @@ class Continuation(ABC):
 
     @abstractmethod
     def _solved(self, qpos: FloatArray) -> FloatArray:
-        """Jacobians ``(k, m, p)`` of what Newton solves for, columns in the order of the side table."""
+        """Rows ``(k, m, nv)`` that Newton solves, at configurations ``(k, nq)``."""
 
     @abstractmethod
     def _refuse(self, sample: int, target: FloatArray, reached: FloatArray, there: Assembly) -> None:

@@ -148,7 +148,7 @@ def newton_step(  # type: ignore[no-untyped-def]
                 condition[s] = abs(a[0, 0] / a[p - 1, p - 1]) if found == p else math.inf
                 weakest[s] = passive[perm[min(found, p - 1)]]
             if side[s] == UNKNOWN or limits[3]:  # the step to rounding does not change it
-                side[s] = side_of(jac, a, found, table, work)
+                side[s] = side_of(jac, found, table, work)
         if again:
             for i in range(m):
                 rhs[i] = -res[i]

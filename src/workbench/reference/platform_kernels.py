@@ -67,7 +67,7 @@ def platform_newton(  # type: ignore[no-untyped-def]
             condition[s] = abs(a[0, 0] / a[nv - 1, nv - 1]) if found == nv else math.inf
             weakest[s] = perm[min(found, nv - 1)]
             if side[s] == UNKNOWN or limits[3]:  # the step to rounding does not change it
-                side[s] = side_of(jac, a, found, table, work)
+                side[s] = side_of(jac, found, table, work)
         if again:
             for i in range(m):
                 rhs[i] = -res[i]

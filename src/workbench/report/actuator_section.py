@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from workbench.campaign.actuators import Margin, answer, shortfalls, worst_of
+from workbench.campaign.margins import Margin, answer, shortfalls, worst_of
 from workbench.report.attention import margins_of, unknown_cases
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
