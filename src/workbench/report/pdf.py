@@ -139,7 +139,9 @@ def _blocks(section: Section, style: str, parts: dict[str, str]) -> Iterator[Blo
     context = section.context
     if "sentence" in context:
         yield {"kind": "verdict", **_badge(context["status"]), "sentence": context["sentence"]}
-    if context.get("about"):
+    if context.get("compared"):
+        yield from _opening(context, style, parts)
+    elif context.get("about"):
         yield _text(context["about"])
     if context.get("attention"):
         yield _text("Needs attention (no failure of a formula; the verdict stands):")
@@ -158,13 +160,33 @@ def _blocks(section: Section, style: str, parts: dict[str, str]) -> Iterator[Blo
         yield _text(context["note"])
     views = context.get("views", ())
     cases = [view for view in views if isinstance(view, CaseView)]
-    if not cases:
+    if not cases and not context.get("compared"):
         yield from _figures(section, views, style, parts)
     yield from map(_table, context.get("tables", ()))
     if context.get("points"):
         yield {"kind": "points", "points": list(context["points"])}
     for view in cases:
         yield from _case(view, style, parts)
+
+
+def _opening(context: Mapping[str, Any], style: str, parts: dict[str, str]) -> Iterator[Block]:
+    """What stands on the first page, before the contents: what was compared, what to look at, the robot, all cases."""
+    still, sketch, picture = context["still"], context["sketch"], None
+    if still is not None:
+        picture = _figure(
+            "still.svg", f"The robot, rendered by MuJoCo at the first moment of case {still.case}", still.alt
+        )
+        parts["still.svg"] = _picture(still.still, still.still_file)
+    elif sketch is not None:
+        picture = _figure(f"{sketch.key}.svg", sketch.caption, sketch.alt)
+        parts[f"{sketch.key}.svg"] = _drawing(sketch, style)
+    found = [point.text for point in context["findings"]]
+    calm = "" if found or context.get("attention") else "Nothing needs attention."
+    texts = [text for text in (context["compared"], context["about"], calm) if text]
+    yield {"kind": "opening", "texts": texts, "points": found, "picture": picture, "head": True}
+    if context["glance"] is not None:
+        for block in _plots((context["glance"],), style, parts, {}):
+            yield block | {"head": True}
 
 
 def _figures(section: Section, views: Iterable[Any], style: str, parts: dict[str, str]) -> Iterator[Block]:
@@ -195,11 +217,6 @@ def _case(view: CaseView, style: str, parts: dict[str, str]) -> Iterator[Block]:
     yield from _plots(view.plots, style, parts, {})
     if view.film is not None and view.film.note:
         yield _text(f"No rendered picture: {view.film.note}.")
-    elif view.film is not None and view.film.still:
-        name = f"{view.anchor}-still.svg"
-        parts[name] = _picture(view.film.still, view.film.still_file)
-        caption = "The robot's model as MuJoCo renders it, at the first moment of this case"
-        yield {"kind": "plots", "plots": [_figure(name, caption, view.film.alt)], "wide": False}
     yield from map(_table, view.tables)
 
 
