@@ -182,6 +182,7 @@ def reproduce_section(manifest: Manifest) -> Section:
         ("Model SHA-256", manifest.model.sha256),
         ("Mechanism", manifest.model.mechanism),
         *([("Engines", ", ".join(manifest.engines))] if manifest.engines else []),
+        ("Documents cited as docs/…", "workbench docs NAME prints them, without a checkout too"),
         *((f"Version of {name}", version) for name, version in manifest.versions.items()),
     ]
     table = Table(

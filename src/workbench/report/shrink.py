@@ -6,6 +6,7 @@ None of this moves anything that is seen by more than a twentieth of a point.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 from workbench.report.style import GRID
 
@@ -13,6 +14,7 @@ _STEP = re.compile(r"([A-Zz])\s*(?:(-?[\d.]+(?:e-?\d+)?)[\s]+(-?[\d.]+(?:e-?\d+)
 _GROUP = re.compile(r"(</?g(?: [^<>]*)?>\n?)")
 _GRID_LINE = re.compile(rf'<path d="([^"]*)"((?: clip-path="[^"]*")?) (style="[^"]*stroke: {GRID}[^"]*")/>\n?')
 _TICK = re.compile(r'<defs>\s*<path id="([^"]*)" d="M0 0l(-?[\d.]+ ?-?[\d.]+)" style="[^"]*"/>\s*</defs>\n?')
+_USE = re.compile(r'<use (?:xlink:)?href="#([^"]*)" x="([^"]*)" y="([^"]*)" (style="[^"]*")/>\n?')
 _SHAPE = re.compile(
     r'<defs>\s*(?:<path id="([^"]*)" ([^<>]*)/>|<clipPath id="([^"]*)">\s*(<rect [^<>]*/>)\s*</clipPath>)\s*</defs>\n?'
 )
@@ -59,24 +61,26 @@ def tenths(value: int) -> str:
 
 def merge_lines(svg: str) -> str:
     """Make one path of the grid's lines, and one of the ticks, of each axis."""
-    return "".join(part if part.startswith(("<g", "</g")) else _merged(part) for part in _GROUP.split(svg))
+    ticks = {match[1]: match[2] for match in _TICK.finditer(svg)}  # panels share them
+    svg = "".join(part if part.startswith(("<g", "</g")) else _merged(part, ticks) for part in _GROUP.split(svg))
+    return _TICK.sub(lambda match: match[0] if f'href="#{match[1]}"' in svg else "", svg)
 
 
-def _merged(part: str) -> str:
+def _merged(part: str, ticks: Mapping[str, str]) -> str:
     for clip, style in dict.fromkeys((match[2], match[3]) for match in _GRID_LINE.finditer(part)):
         lines = [match for match in _GRID_LINE.finditer(part) if (match[2], match[3]) == (clip, style)]
         whole = f'<path d="{"".join(match[1] for match in lines)}"{clip} {style}/>\n'
         for match in lines[1:]:
             part = part.replace(match[0], "", 1)
         part = part.replace(lines[0][0], whole, 1)
-    for tick in list(_TICK.finditer(part)):
-        use = re.compile(rf'<use (?:xlink:)?href="#{re.escape(tick[1])}" x="([^"]*)" y="([^"]*)" (style="[^"]*")/>\n?')
-        uses = list(use.finditer(part))
-        if not uses or len({found[3] for found in uses}) > 1:
-            continue
-        drawn = "".join(f"M{_pair(round(10 * float(at[1])), round(10 * float(at[2])))}l{tick[2]}" for at in uses)
-        part = part.replace(tick[0], f'<path d="{drawn}" {uses[0][3]}/>\n', 1)
-        part = use.sub("", part)
+    for found in dict.fromkeys((match[1], match[4]) for match in _USE.finditer(part) if match[1] in ticks):
+        uses = [match for match in _USE.finditer(part) if (match[1], match[4]) == found]
+        drawn = "".join(
+            f"M{_pair(round(10 * float(at[2])), round(10 * float(at[3])))}l{ticks[found[0]]}" for at in uses
+        )
+        for match in uses[1:]:
+            part = part.replace(match[0], "", 1)
+        part = part.replace(uses[0][0], f'<path d="{drawn}" {found[1]}/>\n', 1)
     return part
 
 
