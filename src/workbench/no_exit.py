@@ -34,7 +34,8 @@ _real: dict[str, Callable[..., Any]] = {}
 _process = [0]
 _inside = [0]
 """calls of a user's code that are under way"""
-_for_good = [False]
+_for_good = [0]
+"""the process that is a command of the workbench; not what is forked off it"""
 _kept: list[Any] = []
 """callbacks that machine code holds"""
 
@@ -53,7 +54,7 @@ def no_exit() -> Iterator[None]:
 
 def for_good() -> None:
     """Say that this process is a command of the workbench: what a user's code leaves behind cannot end it either."""
-    _for_good[0] = True
+    _for_good[0] = os.getpid()
 
 
 def _install() -> None:
@@ -99,7 +100,7 @@ def _signal_guard(name: str) -> Callable[..., Any]:
 
 def _let_through() -> bool:
     """Whether the call is none of the user's: of the package, of a process forked off, or of whoever called it."""
-    if os.getpid() != _process[0] or not (_inside[0] or _for_good[0]):
+    if os.getpid() != _process[0] or not (_inside[0] or _for_good[0] == os.getpid()):
         return True
     try:
         return sys._getframe(2).f_code.co_filename.startswith(OWN)
