@@ -179,7 +179,8 @@ def models(model: str) -> Iterator[Bad]:
             files,
             "bad.xml",
         )
-        yield Bad(f"model: {what}: check", ("model", "check", "bad.xml"), files, codes=(0, 1, 2))
+        check = ("model", "check", "bad.xml")
+        yield Bad(f"model: {what}: check", check, files, codes=(2,) if body is many else (0, 1, 2))
 
 
 # --- formulas ---------------------------------------------------------------------------------------------------------

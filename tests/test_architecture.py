@@ -44,6 +44,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "errors",
         "data_files",
         "limits",
+        "no_exit",
         "processes",
         "reading",
         "parquet_columns",

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from workbench.cli import app
 from workbench.data_files import bundled, bundled_names
 from workbench.errors import WorkbenchError
 
@@ -77,7 +80,7 @@ def test_a_wheel_carries_models_and_campaigns(repository: Path, tmp_path: Path) 
         path.chmod(0o555 if path.is_dir() else 0o444)
     code = (
         "import workbench.data_files as d; print(d.__file__);"
-        "print(*[d.bundled(k, n) for k in ('models', 'campaigns') for n in d.bundled_names(k)], sep='\\n')"
+        "print(*[d.bundled(k, n) for k in ('models', 'campaigns', 'docs') for n in d.bundled_names(k)], sep='\\n')"
     )
     environment = {**os.environ, "PYTHONPATH": str(site), "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run(
@@ -86,6 +89,22 @@ def test_a_wheel_carries_models_and_campaigns(repository: Path, tmp_path: Path) 
     module, *found = map(Path, done.stdout.split("\n")[:-1])
     assert module == site / "workbench" / "data_files.py"
     shipped = {*(repository / "models").glob("*.xml"), *(repository / "campaigns").glob("*.toml")}
-    assert {path.parent.name for path in shipped} == {"models", "campaigns"}
+    shipped |= set((repository / "docs").rglob("*.md"))
+    assert {path.parent.name for path in shipped} == {"models", "campaigns", "docs", "derivations"}
     assert set(found) == {site / "workbench" / "data" / path.relative_to(repository) for path in shipped}
     assert {path: path.stat().st_mtime_ns for path in site.rglob("*")} == before
+
+
+def test_every_document_that_is_cited_can_be_read_from_the_package(repository: Path) -> None:
+    cited = {
+        name
+        for folder, pattern in (("campaigns", "*.toml"), ("src/workbench", "**/*.py"))
+        for path in (repository / folder).glob(pattern)
+        for name in re.findall(r"docs/([a-z0-9_/-]+\.md)", path.read_text(encoding="utf-8"))
+    }
+    assert {"evidence.md", "derivations/asym_2rss_ppap.md"} <= cited
+    assert cited <= set(bundled_names("docs"))
+    assert not {"gone.md"} <= set(bundled_names("docs"))
+    done = CliRunner().invoke(app, ["docs", "docs/derivations/asym_2rss_ppap.md, section 7"])
+    assert done.output == (repository / "docs" / "derivations" / "asym_2rss_ppap.md").read_text(encoding="utf-8")
+    assert "derivations/planar_4rprp" in CliRunner().invoke(app, ["docs"]).output.split()

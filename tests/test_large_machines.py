@@ -1,4 +1,4 @@
-"""Machines of 15 to 60 joints: towers of loops, coupled fingers."""
+"""Machines of 15 to 60 joints: towers of loops, coupled fingers. Of more than a few hundred: one line."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from made_machines import hand, tower
+from made_machines import HEAD, custom, hand, tower
 from nullspace_oracle import NullSpaceOracle
+from workbench.errors import ModelError
+from workbench.importing.proposal import propose
+from workbench.limits import MOST_FREEDOMS
 from workbench.reference import MujocoReference
 from workbench.reference.power import PLAIN, power_balance
+from workbench.reference.survey import INDEPENDENT, _Rest
 
 AGREE = 1e-9
 FORCE = np.array([1.0, 2.0, -3.0])
@@ -66,3 +70,45 @@ def test_a_large_machine_reaches_no_more_than_rounding(tmp_path: Path) -> None:
     balance = power_balance(reference, q, qd, qdd, external_force=FORCE)
     assert balance.relative > PLAIN
     assert balance.relative < balance.rounding < 100 * balance.relative
+
+
+def loose(joints: int) -> str:
+    """Bodies side by side, each on a hinge with a motor."""
+    body = '<body><joint name="j{0}"/><geom size=".01" mass="1"/><site name="s{0}"/></body>'
+    bodies = "".join(body.format(k) for k in range(joints))
+    motors = "".join(f'<motor joint="j{k}"/>' for k in range(joints))
+    return f"{HEAD}{custom('s0')}<worldbody>{bodies}</worldbody><actuator>{motors}</actuator></mujoco>"
+
+
+def test_more_joints_than_can_be_answered_for_are_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "many.xml"
+    said = rf"many.xml: joints with {MOST_FREEDOMS + 1} freedoms; allowed: {MOST_FREEDOMS}; "
+    path.write_text(loose(MOST_FREEDOMS + 1), encoding="utf-8")
+    for look in (MujocoReference, propose):
+        with pytest.raises(ModelError, match=said) as caught:
+            look(path)
+        assert "\n" not in str(caught.value)
+    path.write_text(loose(MOST_FREEDOMS), encoding="utf-8")
+    assert len(MujocoReference(path).joint_names) == MOST_FREEDOMS
+
+
+@pytest.mark.parametrize("spoiled", [False, True])
+def test_joints_that_drive_a_motion_are_counted_as_by_rank(spoiled: bool) -> None:
+    """Step by step against the rank of all columns taken so far; the twin forgets every second step."""
+    rng = np.random.default_rng(4)
+    unlike = 0
+    for _ in range(20):
+        motions = np.linalg.qr(rng.normal(size=(12, 5)))[0].T
+        motions[:, rng.choice(12, 4, replace=False)] = 0.0
+        motions = np.linalg.qr(motions.T)[0].T
+        rest, taken = _Rest(motions), np.zeros((0, 5))
+        for count, column in enumerate(rng.permutation(12)):
+            more = np.vstack([taken, motions[:, column]])
+            free = np.linalg.matrix_rank(more, tol=INDEPENDENT) > len(taken)
+            taken = more if free else taken
+            unlike += rest.take(column) is not bool(free)
+            if spoiled and count % 2:
+                rest._count = max(0, rest._count - 1)
+            left = np.linalg.svd(taken)[2][len(taken) :] @ motions
+            unlike += bool(np.abs(rest.scores - np.linalg.norm(left, axis=0)).max() > 1e-6)
+    assert unlike > 5 if spoiled else unlike == 0

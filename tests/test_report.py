@@ -603,7 +603,11 @@ def test_only_the_pages_own_script_may_run(run: Path) -> None:
 
 
 def test_plots_tell_the_script_their_scales(run: Path) -> None:
-    drawings = {str(attributes["aria-label"])[:30]: attributes for tag, attributes in parse(run).tags if tag == "svg"}
+    drawings = {
+        str(attributes["aria-label"])[:30]: attributes
+        for tag, attributes in parse(run).tags
+        if tag == "svg" and "aria-label" in attributes
+    }
     panels = json.loads(str(drawings["Case sim1, joint q2: force or "]["data-panels"]))
     assert [panel["log"] for panel in panels] == [False, True]
     assert panels[0]["name"] == "τ2 [N·m]"
@@ -622,7 +626,9 @@ def test_the_drawing_moves_as_the_points_do(run: Path) -> None:
     assert figure["data-case"] == "case-sim1"
     assert told["lines"] == {"driven": [[0, 1]], "platform": [[2, 3]]}
     assert told["joints"] == {"hinge-driven": [0], "ball": [1]}
-    frames = np.cumsum(np.array(told["views"][1]), axis=0).reshape(len(told["t"]), 4, 2) / told["scale"]
+    places = np.cumsum(np.array(told["places"]), axis=0).reshape(len(told["t"]), 4, 3) / told["scale"]
+    view = np.array(told["views"][1])
+    frames = places @ view[:, :3].T + view[:, 3]
     t = np.array(told["t"])
     # the arm's length on paper is the same at all times, as it is in the view along its axis
     arm = np.hypot(*(frames[:, 1] - frames[:, 0]).T)
@@ -645,8 +651,8 @@ def test_a_run_without_points_has_no_drawing(tmp_path: Path) -> None:
 
 
 def test_figures_have_alternative_texts(run: Path) -> None:
-    drawings = [attributes for tag, attributes in parse(run).tags if tag == "svg"]
-    assert len(drawings) == 2 * 8 + 5
+    drawings = [a for tag, a in parse(run).tags if tag == "svg" and a.get("class") != "shapes"]
+    assert len(drawings) == 2 * 9 + 7
     assert all(len(str(attributes["aria-label"])) > 30 for attributes in drawings)
     images = re.findall(r'<img src="([^"]*)" alt="([^"]*)"', (run / "report.md").read_text(encoding="utf-8"))
     assert len(images) == len(drawings)

@@ -26,7 +26,9 @@ def test_the_page_holds_the_stored_frames_in_the_case_that_they_show(tmp_path: P
     assert film["data-case"] == "case-sim1"
     assert [float(t) for t in film["data-film"].split()] == list(TIMES)
     sheet = base64.b64encode((run / "pictures" / "film.webp").read_bytes()).decode()
-    assert [a["src"] for tag, a in parse(run).tags if tag == "img"] == [f"data:image/webp;base64,{sheet}"]
+    still = base64.b64encode((run / "pictures" / "mechanism.webp").read_bytes()).decode()
+    shown = [f"data:image/webp;base64,{data}" for data in (still, sheet)]  # on the first screen, and in the case
+    assert [a["src"] for tag, a in parse(run).tags if tag == "img"] == shown
     text = (run / "report.md").read_text(encoding="utf-8")
     assert text.count('<img src="pictures/mechanism.webp" alt="The robot') == 1
     assert b"/Subtype/Image" in (run / "report.pdf").read_bytes().replace(b" ", b"")

@@ -16,7 +16,8 @@ from small_campaign import CASE, HEAD, MOTION, Workbench
 from workbench.campaign.changed import CASE as BY_CASE
 from workbench.campaign.changed import Change, sentences
 from workbench.campaign.conclusion import EXIT_CODES, CaseOutcome, case_status, conclude, conclude_sweep
-from workbench.campaign.replacing import refuse_loss, request_of
+from workbench.campaign.evidence import Effort
+from workbench.campaign.replacing import lost_evidence, refuse_loss, request_of
 from workbench.compare.parameters import parameter_changes
 from workbench.errors import OutputError
 from workbench.report import build_report
@@ -287,6 +288,56 @@ def test_a_larger_run_is_replaced_only_when_asked(workbench: Workbench, tmp_path
     assert workbench.run(campaign, *options, "--only", "first", "--replace").code == 4
     assert list(json.loads((tmp_path / "run/manifest.json").read_text())["cases"]) == ["first"]
     assert workbench.run(campaign, *options).code == 4  # more cases of the same robot lose nothing
+
+
+def test_a_run_of_less_evidence_takes_the_place_of_more_only_when_asked(workbench: Workbench, tmp_path: Path) -> None:
+    campaign = HEAD + CASE + '[[candidate]]\nname = "lumped"\nreference = "lumped"\nbound = 1e-10\n'
+    options = ("--no-pictures", "--out", "run")
+    assert workbench.run(campaign, *options).code == 0
+    before = (tmp_path / "run/manifest.json").read_bytes()
+    done = workbench.run(campaign, "--quick", *options)
+    assert done.code == 2
+    (line,) = done.complaint
+    assert "run: holds an earlier run with its error budget (power balance, forward replay), which this one" in line
+    assert "--replace" in line
+    assert (tmp_path / "run/manifest.json").read_bytes() == before
+    assert workbench.run(campaign, *options).code == 0  # as much
+    assert workbench.run(campaign, "--quick", "--replace", *options).code == 0
+    assert json.loads((tmp_path / "run/manifest.json").read_text())["budget"] is False
+    assert workbench.run(campaign, "--quick", *options).code == 0
+    assert workbench.run(campaign, *options).code == 0  # more evidence loses nothing
+
+
+@pytest.mark.parametrize(
+    ("old", "lost"),
+    [
+        ({"budget": True, "engines": ["mujoco"]}, "error budget"),
+        ({"budget": False, "engines": ["mujoco", "pinocchio"]}, "a further engine (pinocchio)"),
+        ({"budget": False, "engines": ["mujoco"]}, ""),
+        ({}, ""),
+        ({"budget": "yes", "engines": 3}, ""),
+    ],
+)
+def test_what_of_evidence_would_be_lost(old: dict[str, Any], lost: str) -> None:
+    said = "; ".join(lost_evidence(old, Effort(budget=False)))
+    assert (lost in said) if lost else said == ""
+    assert not lost_evidence(old, Effort(("mujoco", "pinocchio")))
+
+
+def test_a_dry_run_goes_on_past_cases_that_cannot_be_driven_when_asked(workbench: Workbench, tmp_path: Path) -> None:
+    campaign = HEAD + FAR + CASE + '[[candidate]]\nname = "lumped"\nreference = "lumped"\nbound = 1e-10\n'
+    assert workbench.run(campaign, "--quick", "--dry-run").code == 2
+    done = workbench.run(campaign, "--quick", "--dry-run", "--keep-going")
+    assert done.code == 0
+    assert "1 cases, 21 samples" in done.out
+    assert 'cannot be driven, left out: small.toml: case "far"' in " ".join(done.out.split())
+    assert [path.name for path in tmp_path.glob("run*")] == []
+    assert (
+        workbench.run(
+            HEAD + FAR + '[[candidate]]\nname = "lumped"\nreference = "lumped"\n', "--dry-run", "--keep-going"
+        ).code
+        == 2
+    )
 
 
 def test_cases_that_cannot_be_driven_are_left_out_with_the_nearest_that_can(

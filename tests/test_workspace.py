@@ -126,3 +126,25 @@ def test_malformed_limits_are_one_line(option: str, tmp_path: Path, capsys: pyte
     assert _run(["workspace", MODELS[0], "--out", str(tmp_path / "ws"), "--limit", *option.split(" ")]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
     assert not (tmp_path / "ws").exists()
+
+
+def test_another_workspace_takes_its_place_only_when_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "ws"
+    once = ["workspace", MODELS[0], "--grid", "0.08", "--out", str(out)]
+    assert _run(once) == 0
+    before = (out / "workspace.json").read_bytes()
+    assert _run(once) == 0  # the same again
+    capsys.readouterr()
+    others = {
+        "parameters": [*once, "--set", "a2=0.31"],
+        "a robot, parameters": ["workspace", MODELS[1], *once[2:]],
+        "ranges of joints": [*once, "--limit", "q1=-0.05:0.05"],
+        "a grid": [*once, "--grid", "0.09"],
+    }
+    for what, other in others.items():
+        assert _run(other) == 2
+        said = capsys.readouterr().err.strip().splitlines()[-1]
+        assert f"ws: holds an earlier workspace with {what} unlike this one's; --replace puts" in said
+        assert (out / "workspace.json").read_bytes() == before
+    assert _run([*others["a grid"], "--replace"]) == 0
+    assert json.loads((out / "workspace.json").read_text())["spacing_m"] == 0.09

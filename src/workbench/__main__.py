@@ -30,7 +30,9 @@ def main() -> NoReturn:
     """Run the command line."""
     leave_current_directory_out()
     from workbench.cli import main as run
+    from workbench.no_exit import for_good
 
+    for_good()
     run()
 
 

@@ -21,6 +21,7 @@ import typer
 from workbench._version import __version__
 from workbench.commands.compare import compare
 from workbench.commands.diagnose import diagnose
+from workbench.commands.docs import docs
 from workbench.commands.model import model
 from workbench.commands.new import new
 from workbench.commands.report import report
@@ -79,6 +80,7 @@ app.command()(report)
 app.command()(run)
 app.command()(new)
 app.command()(status)
+app.command()(docs)
 app.command()(workspace)
 app.add_typer(model)
 app.command()(compare)

@@ -15,8 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from workbench.campaign.actuators import answer, shortfalls
-from workbench.campaign.changed import ANOTHER, Change, sentences
+from workbench.campaign.changed import ANOTHER, Change, not_known, sentences
 from workbench.campaign.compare import Row
 from workbench.campaign.conclusion import (
     FAILED,
@@ -28,6 +27,7 @@ from workbench.campaign.conclusion import (
 )
 from workbench.campaign.good import NO, WORDS, YES, answers, good_enough
 from workbench.campaign.good import UNDECIDED as UNDECIDED_ANSWER
+from workbench.campaign.margins import answer, shortfalls
 from workbench.campaign.not_driven import NOT_DRIVEN
 from workbench.campaign.run import Outcome
 from workbench.campaign.verdict import (
@@ -189,7 +189,8 @@ def print_outcome(outcome: Outcome) -> None:
 
 def _print_attention(outcome: Outcome) -> None:
     """Print what changes no verdict and still has to be looked at: accuracy that was asked for, actuators too small."""
-    unknown = [name for name, case in outcome.manifest["cases"].items() if case["status"] == NOT_DRIVEN]
+    cases = outcome.manifest["cases"].items()
+    unknown = not_known([name for name, case in cases if case["status"] == NOT_DRIVEN])
     for found in answers(outcome.rows, outcome.manifest["good"], unknown):
         out.print(Text(found.sentence, style=ANSWERS[found.answer]), soft_wrap=True)
     held = outcome.margins
@@ -271,6 +272,13 @@ def _table(title: str, rows: list[Row], joints: Iterable[str], show: Any, good: 
     return _laid_out(title, rows, names, show, good, case_above=True)
 
 
+def _force(joint: str, rows: list[Row]) -> str:
+    """Name the generalized force of a joint with its unit: ``tau2 [N m]`` of q2."""
+    unit = next((row.unit for row in rows if row.joint == joint), "")
+    number = joint.removeprefix("q")
+    return (f"tau{number}" if number.isdigit() else f"tau {joint}") + (f" [{unit}]" if unit else "")
+
+
 def _laid_out(
     title: str, rows: list[Row], joints: Iterable[str], show: Any, good: float | None, *, case_above: bool
 ) -> Table:
@@ -281,7 +289,7 @@ def _laid_out(
     for column in (["candidate"] if case_above else ["case", "candidate"]) + ["MuJoCo model"]:
         table.add_column(column, overflow="fold")
     for joint in joints:
-        table.add_column(joint, justify="right", no_wrap=True)
+        table.add_column(_force(joint, rows), justify="right", no_wrap=True)
     if len(bounds) > 1:
         table.add_column("bound", justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)

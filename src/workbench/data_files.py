@@ -1,4 +1,4 @@
-"""Where the models and campaigns that come with the workbench lie: inside the wheel, or in a source checkout."""
+"""Where models, campaigns and documents that come with the workbench lie: inside the wheel, or in a source checkout."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Literal, get_args
 
 from workbench.errors import WorkbenchError, did_you_mean
 
-Kind = Literal["models", "campaigns"]
+Kind = Literal["models", "campaigns", "docs"]
 
-SUFFIXES: dict[str, str] = {"models": ".xml", "campaigns": ".toml"}
+SUFFIXES: dict[str, str] = {"models": ".xml", "campaigns": ".toml", "docs": ".md"}
 """What the files of each kind end in; a name may be given without it."""
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -21,7 +21,7 @@ def bundled_directory(kind: Kind, package: Path = _PACKAGE) -> Path:
     Parameters
     ----------
     kind
-        ``models`` or ``campaigns``.
+        ``models``, ``campaigns`` or ``docs``.
     package
         Directory of the package ``workbench``; another one only in tests.
 
@@ -43,23 +43,25 @@ def bundled_directory(kind: Kind, package: Path = _PACKAGE) -> Path:
 
 
 def bundled_names(kind: Kind, package: Path = _PACKAGE) -> tuple[str, ...]:
-    """Return the file names of one kind, sorted.
+    """Return the file names of one kind, sorted; those of documents with their folder, ``derivations/x.md``.
 
     Raises
     ------
     WorkbenchError
         As `bundled_directory`.
     """
-    return tuple(sorted(path.name for path in bundled_directory(kind, package).glob(f"*{SUFFIXES[kind]}")))
+    directory = bundled_directory(kind, package)
+    pattern = f"{'**/' if kind == 'docs' else ''}*{SUFFIXES[kind]}"
+    return tuple(sorted(path.relative_to(directory).as_posix() for path in directory.glob(pattern)))
 
 
 def bundled(kind: Kind, name: str, package: Path = _PACKAGE) -> Path:
-    """Return the path of a model or campaign that comes with the workbench.
+    """Return the path of a model, campaign or document that comes with the workbench.
 
     Parameters
     ----------
     kind
-        ``models`` or ``campaigns``.
+        ``models``, ``campaigns`` or ``docs``.
     name
         File name, with or without its ending: ``NAME.xml`` or ``NAME``.
     package

@@ -48,6 +48,14 @@ def page_file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
     return run / "report.html"
 
 
+@pytest.fixture(scope="module")
+def plain_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page of names as people give them: hostile ones of 400 letters need more room than a screen has."""
+    run = make_run(tmp_path_factory.mktemp("plain") / "run")
+    build_report(run, ["html"])
+    return run / "report.html"
+
+
 @contextmanager
 def opened(
     chromium: Any, file: Path, width: int = 1280, scheme: str = "light", **options: Any
@@ -67,6 +75,11 @@ def opened(
     context.close()
 
 
+def open_all(page: Any) -> None:
+    """Open whatever is folded."""
+    page.evaluate("() => { for (const folded of document.querySelectorAll('details')) folded.open = true; }")
+
+
 def fault_of(script: str) -> str:
     return f"<script>{script}</script></body>"
 
@@ -76,8 +89,10 @@ def fault_of(script: str) -> str:
 def test_nothing_is_asked_for_and_every_figure_is_seen(chromium: Any, page_file: Path, width: int, scheme: str) -> None:
     with opened(chromium, page_file, width, scheme) as (page, trouble):
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+        open_all(page)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
         drawings = page.locator("figure svg")
-        assert drawings.count() == 2 * 8 + 5
+        assert drawings.count() == 2 * 9 + 7
         for index in range(drawings.count()):
             box = drawings.nth(index).bounding_box()
             assert box["width"] > 200
@@ -108,6 +123,7 @@ def test_trouble_is_seen(chromium: Any, page_file: Path, tmp_path: Path) -> None
 
 def test_tables_sort_by_the_number_behind_the_text(chromium: Any, page_file: Path) -> None:
     with opened(chromium, page_file) as (page, trouble):
+        open_all(page)
         table = page.locator("#table-case-sim2-modelling")
         column = 3
         values = f"(t) => [...t.tBodies[0].rows].map(r => Number(r.cells[{column}].dataset.value))"
@@ -126,8 +142,9 @@ def test_tables_sort_by_the_number_behind_the_text(chromium: Any, page_file: Pat
 
 def test_tables_filter(chromium: Any, page_file: Path) -> None:
     with opened(chromium, page_file) as (page, _):
+        open_all(page)
         table = page.locator(".table", has=page.locator("#table-case-sim2-verification"))
-        table.locator("input").fill("q2 rotation")
+        table.locator("input").fill("τ2 rotation")
         shown = table.locator("tbody tr:visible")
         assert shown.count() == 1
         assert shown.first.locator("td").first.inner_text() == "distributed-rotation"
@@ -136,6 +153,11 @@ def test_tables_filter(chromium: Any, page_file: Path) -> None:
 
 MARKERS = """(article) => [...document.querySelectorAll(`figure[data-case="${article.id}"]`)].map((figure) =>
     [...figure.querySelectorAll(".cursor")].map((c) => [c.getAttribute("visibility"), Number(c.getAttribute("x1"))]))"""
+MOVED = """(presses) => {
+    const slider = document.querySelector("#case-sim1 input[type=range]");
+    const share = (slider.value - slider.min) / (slider.max - slider.min);
+    return share > 0.1 * presses - 0.05 && document.querySelector("#case-sim1 .readout").textContent !== ""; }"""
+"""Whether so many presses of a key have arrived: the browser tells the page of them when it likes."""
 DRAWN = (
     """(article) => document.querySelector(`#plot-${article.id}-mechanism .wb-line-1-driven path`).getAttribute("d")"""
 )
@@ -149,18 +171,20 @@ def test_the_slider_moves_every_marker(chromium: Any, page_file: Path) -> None:
         slider.focus()
         for _ in range(3):
             page.keyboard.press("PageUp")
+        page.wait_for_function(MOVED, arg=3)
         first = article.evaluate(MARKERS)
         timed = [lines for lines in first if lines]
         assert len(timed) >= 7 + 4  # motion, torques, reactions, and the campaign's figures of this case
         assert all(visible == "visible" for lines in timed for visible, _ in lines)
         page.keyboard.press("PageUp")
+        page.wait_for_function(MOVED, arg=4)
         second = [lines for lines in article.evaluate(MARKERS) if lines]
         for one, other in zip(timed, second, strict=True):
             assert all(b[1] > a[1] + 1 for a, b in zip(one, other, strict=True))
         assert article.evaluate(DRAWN) != before
         other_case = page.locator("#case-sim2").evaluate(MARKERS)
         assert all(visible == "hidden" for lines in other_case for visible, _ in lines)
-        readouts = article.locator(".readout").all_inner_texts()
+        readouts = article.locator(".readout").all_text_contents()  # one is folded
         assert all(text.startswith("t = ") for text in readouts)
         assert trouble == []
 
@@ -170,6 +194,7 @@ def test_the_values_under_the_slider_are_those_of_the_series(chromium: Any, page
 
     series = pd.read_parquet(page_file.parent / "series" / "sim2.parquet")
     with opened(chromium, page_file) as (page, _):
+        open_all(page)
         article = page.locator("#case-sim2")
         sample = 77
         article.locator("input[type=range]").evaluate(
@@ -226,6 +251,7 @@ def test_outcomes_differ_at_a_glance(chromium: Any, page_file: Path) -> None:
 
 def test_names_are_text(chromium: Any, page_file: Path) -> None:
     with opened(chromium, page_file) as (page, trouble):
+        open_all(page)
         assert page.locator("script").count() == 1
         assert page.locator("main img, main b").count() == 0
         assert trouble == []
@@ -233,7 +259,7 @@ def test_names_are_text(chromium: Any, page_file: Path) -> None:
 
 def test_readable_without_a_script(chromium: Any, page_file: Path) -> None:
     with opened(chromium, page_file, java_script_enabled=False) as (page, trouble):
-        assert page.locator("figure svg").count() == 2 * 8 + 5
+        assert page.locator("figure svg").count() == 2 * 9 + 7
         assert page.locator(".times, .sort, .filter").count() == 0
         assert page.locator("#table-worst-verification tbody tr").count() >= 12
         assert trouble == []
@@ -242,6 +268,7 @@ def test_readable_without_a_script(chromium: Any, page_file: Path) -> None:
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_serious_fault(chromium: Any, page_file: Path, axe: str, scheme: str) -> None:
     with opened(chromium, page_file, scheme=scheme, bypass_csp=True) as (page, _):
+        open_all(page)
         page.locator("#case-sim1 input[type=range]").press("PageUp")
         page.evaluate(axe)
         found = page.evaluate("() => axe.run(document)")
@@ -256,3 +283,73 @@ def test_axe_finds_no_serious_fault(chromium: Any, page_file: Path, axe: str, sc
                       " document.querySelector('h1').style.color = 'transparent'; }")  # fmt: skip
         spoilt = page.evaluate("() => axe.run(document)")
         assert {fault["id"] for fault in spoilt["violations"]} >= {"label"}
+
+
+def test_the_first_screen_holds_what_and_how_it_came_out(chromium: Any, plain_file: Path) -> None:
+    with opened(chromium, plain_file, width=1300) as (page, _):
+        for what in (".verdict", ".compared", ".still svg", "#plot-figure-at-a-glance svg", "nav.contents a"):
+            box = page.locator(what).first.bounding_box()
+            assert box["height"] > 0, what
+            assert box["y"] < 900, what
+
+
+def test_what_to_look_at_stands_first(chromium: Any, page_file: Path) -> None:
+    with opened(chromium, page_file) as (page, _):
+        hostile = page.locator("#case-slow").count() > 0
+        listed = page.locator(".findings li").all_inner_texts()
+        assert any("was not computed" in text for text in listed)
+        assert hostile == any("against a bound" in text for text in listed)
+
+
+def test_folded_cases_open_by_what_leads_to_them_and_for_print(chromium: Any, page_file: Path) -> None:
+    shut = "() => [...document.querySelectorAll('details:not(.extra):not([open])')].length"
+    with opened(chromium, page_file) as (page, trouble):
+        assert page.locator("#case-sim1 details.fold").get_attribute("open") is not None
+        assert page.locator("#case-sim2 details.fold").get_attribute("open") is None
+        before = page.evaluate(shut)
+        assert before > 1
+        page.locator("#table-cases a[href='#case-sim2']").click()
+        page.wait_for_function("() => document.querySelector('#case-sim2 details.fold').open")
+        assert page.evaluate("() => document.querySelector('#case-sim2').getBoundingClientRect().top") < 200
+        page.evaluate("() => window.dispatchEvent(new Event('beforeprint'))")
+        assert page.evaluate(shut) == 0
+        page.evaluate("() => window.dispatchEvent(new Event('afterprint'))")
+        assert page.evaluate(shut) == before - 1
+        page.get_by_role("button", name="Open all").click()
+        assert page.evaluate("() => [...document.querySelectorAll('details.fold')].every((fold) => fold.open)")
+        assert trouble == []
+
+
+def test_the_contents_stay_in_sight(chromium: Any, page_file: Path) -> None:
+    with opened(chromium, page_file) as (page, _):
+        page.locator("nav.contents a[href='#limits']").click()
+        page.wait_for_function("() => scrollY > 1000")
+        assert abs(page.locator("nav.contents").bounding_box()["y"]) < 2
+        heading = page.locator("#limits-heading").bounding_box()
+        assert 0 <= heading["y"] < 900
+
+
+def test_a_figure_opens_large_and_goes_back(chromium: Any, page_file: Path) -> None:
+    place = "() => [...document.querySelectorAll('figure')].findIndex((f) => f.id === 'plot-case-sim1-torque-1')"
+    with opened(chromium, page_file) as (page, trouble):
+        figure = page.locator("#plot-case-sim1-torque-1")
+        small, at = figure.locator("svg").bounding_box()["width"], page.evaluate(place)
+        figure.locator(".enlarge").focus()
+        page.keyboard.press("Enter")
+        assert page.locator("dialog.large #plot-case-sim1-torque-1").count() == 1
+        assert figure.locator("svg").bounding_box()["width"] > 1.5 * small
+        page.keyboard.press("Escape")
+        page.wait_for_function("() => !document.querySelector('dialog figure')")
+        assert page.evaluate(place) == at
+        assert figure.locator("svg").bounding_box()["width"] == pytest.approx(small)
+        assert trouble == []
+
+
+def test_no_table_of_a_case_is_clipped(chromium: Any, plain_file: Path) -> None:
+    clipped = """() => [...document.querySelectorAll('article .scroll')]
+        .filter((box) => box.scrollWidth > box.clientWidth + 1).map((box) => box.querySelector('table').id)"""
+    with opened(chromium, plain_file, width=1300) as (page, _):
+        open_all(page)
+        assert page.evaluate(clipped) == []
+        page.set_viewport_size({"width": 700, "height": 900})
+        assert page.evaluate(clipped) != []

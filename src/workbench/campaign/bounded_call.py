@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
+from workbench.no_exit import EndsProcess, no_exit
+
 Result = TypeVar("Result")
 
 LIMIT_MB = 1500.0
@@ -48,13 +50,16 @@ def bounded(call: Callable[[], Result], limit_s: float) -> Result:
     Raises
     ------
     UnrulyError
-        Whatever it raised, an exit or an endless recursion too; only Ctrl-C stays what it is.
+        Whatever it raised, an exit or an endless recursion too, and where it would have ended the process; only Ctrl-C
+        stays what it is.
     """
     try:
-        with _time(limit_s), _memory(LIMIT_MB):
+        with no_exit(), _time(limit_s), _memory(LIMIT_MB):
             return call()
     except TooSlow as error:
         raise UnrulyError(f"takes more than {limit_s:g} s", error) from error
+    except EndsProcess as error:
+        raise UnrulyError(said(error), error) from error
     except MemoryError as error:
         raise UnrulyError(f"MemoryError: {said(error) or f'needs more than {LIMIT_MB:g} MB'}", error) from error
     except KeyboardInterrupt:

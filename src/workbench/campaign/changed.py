@@ -71,6 +71,11 @@ def not_known(cases: Sequence[str]) -> str:
     return f" Nothing is known of {few(list(cases))}: not computed." if cases else ""
 
 
+def not_shared(cases: Sequence[str]) -> str:
+    """Say that *cases* are left out of a comparison, likewise."""
+    return f" Left out, since not both runs have computed them: {few(list(cases))}." if cases else ""
+
+
 def among(cases: Sequence[str], every: Sequence[str]) -> str:
     """Say which of *every* case something concerns, in as few names as it takes: `` in a``, `` in all cases but b``."""
     others = [case for case in every if case not in cases]

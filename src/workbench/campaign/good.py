@@ -7,14 +7,12 @@ nothing: no verdict and no exit code depend on it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from workbench.campaign.changed import few, not_known
-from workbench.campaign.spec import Campaign, check_fraction
+from workbench.campaign.changed import few
 from workbench.campaign.verdict import SHARE, WITHOUT_BOUND
-from workbench.errors import SpecError
 
 YES, NO, UNDECIDED = "yes", "no", "undecided"
 WORDS = {YES: "good enough", NO: "NOT good enough", UNDECIDED: "good enough? undecided"}
@@ -63,8 +61,8 @@ class Answer:
     reference: str
     good: float
     rows: tuple[Measured, ...]
-    unknown: tuple[str, ...] = ()
-    """cases that were not computed: nothing is known of them"""
+    besides: str = ""
+    """what it does not cover, a sentence with a blank in front; empty where that is nothing"""
 
     def _with(self, answer: str) -> list[Measured]:
         return [row for row in self.rows if good_enough(row, self.good) == answer]
@@ -77,7 +75,7 @@ class Answer:
     @property
     def sentence(self) -> str:
         """The answer in words, with what decides it: the worst joint and case, and what it does not cover."""
-        return self._told + not_known(self.unknown)
+        return self._told + self.besides
 
     @property
     def _told(self) -> str:
@@ -87,7 +85,7 @@ class Answer:
         asked = f"Is {self.candidate} good enough, within {100 * self.good:.3g} % of {self.reference} on every joint?"
         if self.answer == YES:
             count = len({row.case for row in rows})
-            of = f" in the {count} case{'s' if count > 1 else ''} that could be computed" if self.unknown else ""
+            of = f" in {count} case{'s' if count > 1 else ''}" if self.besides else ""
             return f"{asked} Yes{of}: the largest error is {at}."
         if self.answer == UNDECIDED:
             names = few(list(dict.fromkeys(row.case for row in self._with(UNDECIDED))))
@@ -102,10 +100,10 @@ class Answer:
         return f"{asked} No: {at}; no in {where}{rest}."
 
 
-def answers(rows: Iterable[Measured], good: float | None, unknown: Sequence[str] = ()) -> list[Answer]:
+def answers(rows: Iterable[Measured], good: float | None, besides: str = "") -> list[Answer]:
     """Answer for each formula without a bound, in the order of the rows; nothing where nobody asked.
 
-    *unknown* names the cases that were not computed.
+    *besides* says of which cases nothing is said.
     """
     if good is None:
         return []
@@ -113,49 +111,4 @@ def answers(rows: Iterable[Measured], good: float | None, unknown: Sequence[str]
     for row in rows:
         if good_enough(row, good):
             groups.setdefault((row.candidate, row.reference), []).append(row)
-    return [Answer(*names, good, tuple(found), tuple(unknown)) for names, found in groups.items()]
-
-
-def with_good(campaign: Campaign, good: float | None) -> Campaign:
-    """Return the campaign with another wanted accuracy; None leaves its own.
-
-    Raises
-    ------
-    SpecError
-        No fraction between 0 and 1.
-    """
-    refuse_no_fraction(good)
-    return campaign if good is None else campaign.model_copy(update={"good": good})
-
-
-def refuse_no_fraction(good: float | None) -> None:
-    """Refuse a wanted accuracy of the command line that is no fraction; None is nothing wanted.
-
-    Raises
-    ------
-    SpecError
-        No number between 0 and 1.
-    """
-    if good is not None:
-        try:
-            check_fraction(good)
-        except ValueError as error:
-            raise SpecError(f"--good {good:g}: {error}", key="good", value=good) from error
-
-
-def check_asked(campaign: Campaign, where: str) -> None:
-    """Refuse a wanted accuracy that nothing is held against.
-
-    Raises
-    ------
-    SpecError
-        Every formula has a bound, or there is none.
-    """
-    asked: Sequence[str] = [one.name for one in campaign.candidate if one.bound is None]
-    if campaign.good is not None and not asked:
-        raise SpecError(
-            f"{where}: good = {campaign.good:g}: no formula without a bound, so nothing is held against it; a"
-            " [[candidate]] without bound is measured",
-            key="good",
-            value=campaign.good,
-        )
+    return [Answer(*names, good, tuple(found), besides) for names, found in groups.items()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,6 +48,13 @@ class NotDriven:
             "external_force": list(self.spec.external_force),
             "warnings": [],
         }
+
+
+def refuse_none(cases: Sequence[object], missing: Sequence[NotDriven]) -> None:
+    """Refuse a run of which not one case can be driven: it would hold nothing."""
+    if not cases and missing:
+        count = f"none of {len(missing)} cases can be driven; the first: " if len(missing) > 1 else ""
+        raise MotionError(f"{count}{missing[0].error}", **missing[0].error.facts)
 
 
 def with_nearest_joints(error: MotionError, robot: Robot, q: FloatArray) -> MotionError:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.campaign.changed import few
+from workbench.campaign.evidence import FULL, Effort
 from workbench.campaign.store import MANIFEST
 from workbench.errors import OutputError
 from workbench.reading import read_json
@@ -40,8 +41,9 @@ def refuse_loss(
     request: Request,
     cases: Collection[str],
     candidates: Collection[str],
+    effort: Effort = FULL,
 ) -> None:
-    """Refuse to put a run of another robot, selection or set of candidates in the place of an earlier run.
+    """Refuse to put a run of another robot, selection, candidates or less evidence in the place of an earlier one.
 
     Parameters
     ----------
@@ -52,6 +54,8 @@ def refuse_loss(
         may have been edited in between.
     cases, candidates
         Names that the new run will hold.
+    effort
+        The evidence that it will hold.
 
     Raises
     ------
@@ -63,6 +67,8 @@ def refuse_loss(
     except (OSError, ValueError):
         return
     lost = _lost(old, campaign, request, cases, candidates) if isinstance(old, Mapping) else []
+    if isinstance(old, Mapping) and not old.get("sweep"):
+        lost += lost_evidence(old, effort)
     if lost:
         raise OutputError(
             f"{directory}: holds an earlier run {'; '.join(lost)}; --replace (replace=True) puts this run in its place,"
@@ -93,6 +99,18 @@ def _lost(
     for key, what in (("model", "model"), ("set", "parameters")):
         if key in before and before[key] != request[key]:
             lost.append(f"of another robot: {what} {_asked(before[key])}, here {_asked(request[key])}")
+    return lost
+
+
+def lost_evidence(old: Mapping[str, Any], effort: Effort) -> list[str]:
+    """What an earlier run's manifest holds of evidence that a run of this *effort* does not gather, in words."""
+    lost = []
+    if old.get("budget") is True and not effort.budget:
+        lost.append("with its error budget (power balance, forward replay), which this one does not compute")
+    engines = old.get("engines")
+    gone = [str(name) for name in engines if name not in effort.engines] if isinstance(engines, list) else []
+    if gone:
+        lost.append(f"held against a further engine ({few(gone)})")
     return lost
 
 

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.campaign import store
-from workbench.campaign.actuators import Margin, limits_of, margins_of_facts
+from workbench.campaign.actuators import limits_of
+from workbench.campaign.asked import check_asked, with_good
 from workbench.campaign.cases import Case, resolve_cases, with_unit_hint
 from workbench.campaign.changes import IN_CAMPAIGN, Changes, Variant, changes_of
 from workbench.campaign.claims import judge_claims
@@ -21,10 +22,10 @@ from workbench.campaign.conclusion import CaseOutcome, Conclusion, case_status, 
 from workbench.campaign.cost import cost_us
 from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.figure_spec import FigureSpec
-from workbench.campaign.good import check_asked, with_good
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
-from workbench.campaign.not_driven import NotDriven
+from workbench.campaign.margins import Margin, margins_of_facts
+from workbench.campaign.not_driven import NotDriven, refuse_none
 from workbench.campaign.replacing import refuse_loss, request_of
 from workbench.campaign.spec import Campaign, load_campaign
 from workbench.campaign.user_candidates import Formula, UserCandidate, load_candidates, with_rows
@@ -161,7 +162,8 @@ def run_campaign(
     request = request_of(model, settings or {}, relative, only, candidates)
     if not replace:
         names = [case.name for case in campaign.case if not only or case.name in only]
-        refuse_loss(directory, campaign.name, request, names, {candidate.name for candidate in campaign.candidate})
+        formulas = {candidate.name for candidate in campaign.candidate}
+        refuse_loss(directory, campaign.name, request, names, formulas, effort)
     check_engines(effort.engines)
     check_asked(campaign, str(file))
     missing: list[NotDriven] = []
@@ -172,7 +174,7 @@ def run_campaign(
         alone = len(only or campaign.case) == 1
         hint = "" if alone else "; --keep-going (keep_going=True) records such cases and computes the others"
         raise MotionError(f"{error}{hint}", **error.facts) from error
-    _refuse_none(cases, missing)
+    refuse_none(cases, missing)
     results: list[CaseResult] = []
     with (
         locked(directory),
@@ -197,7 +199,7 @@ def run_campaign(
             progress("", len(cases), len(cases))
         computed = {result.name for result in results}
         cases = [case for case in cases if case.name in computed]
-        _refuse_none(cases, missing)
+        refuse_none(cases, missing)
         rows = [row for result in results for row in result.rows]
         found = {result.name: _judged(result) for result in results} | {m.spec.name: m.facts() for m in missing}
         facts = {case.name: found[case.name] for case in campaign.case if case.name in found}
@@ -242,13 +244,6 @@ def _figure(figure: FigureSpec, changes: Changes) -> dict[str, Any]:
     over = figure.kind == "error_over"  # its cases differ on purpose
     reasons = [changes.why_not(case, IN_CAMPAIGN if over else ()) for case in figure.needs]
     return figure.model_dump() | {"not_about": next((why for why in reasons if why), "")}
-
-
-def _refuse_none(cases: Sequence[Case], missing: Sequence[NotDriven]) -> None:
-    """Refuse a run of which not one case can be driven: it would hold nothing."""
-    if not cases and missing:
-        count = f"none of {len(missing)} cases can be driven; the first: " if len(missing) > 1 else ""
-        raise MotionError(f"{count}{missing[0].error}", **missing[0].error.facts)
 
 
 def _judged(result: CaseResult) -> dict[str, Any]:

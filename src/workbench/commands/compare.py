@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -47,7 +48,7 @@ def compare(
     """
     from rich.text import Text
 
-    from workbench.campaign.good import refuse_no_fraction
+    from workbench.campaign.asked import refuse_no_fraction
     from workbench.commands.before import run_before
     from workbench.commands.change_table import LEGEND, change_table
     from workbench.compare.outcome import NOTHING, WORSE, outcome_of
@@ -90,6 +91,8 @@ def compare(
     if html is not None:
         write_bytes(html, page)
         out.print(Text(f"Page: {html}"), soft_wrap=True)
+    if outcome.alone:
+        out.print(Text(outcome.alone))
     style = {WORSE: "bold red", NOTHING: "bold cyan"}.get(outcome.key, "bold green")
     out.print(Text(outcome.text, style=style), soft_wrap=True)
     if outcome.exit_code:
@@ -145,9 +148,9 @@ def _figure(value: float | None, unit: str) -> str:
 
 def _worst_reaction(found: RunComparison) -> list[Asked]:
     """The reaction of the joint that bears most in the second run."""
-    sizes = {one.item: one.after for one in sorted(found.reactions, key=lambda one: one.after or 0.0)}
-    most = list(sizes)[-1:]
-    return [replace(one, item=f"joint {one.item}") for one in found.reactions if one.item in most]
+    known = [one for one in found.reactions if one.after is not None and not math.isnan(one.after)]
+    most = max(known, key=lambda one: one.after or 0.0, default=None)
+    return [replace(one, item=f"joint {one.item}") for one in found.reactions if most and one.item == most.item]
 
 
 def _print_differences(title: str, found: Sequence[Difference]) -> None:

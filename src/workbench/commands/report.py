@@ -29,7 +29,7 @@ def report(
 
     formats = tuple(dict.fromkeys(format_ or ("html", "md")))
     with Steps("drawing figures") as show:
-        written = build_report(run_dir, formats, style, show, paper)
+        written = build_report(run_dir, formats, style, show, paper, second=True)
     for path in written:
         if path.parent in (run_dir, run_dir / "data"):
             typer.echo(str(path))

@@ -57,7 +57,7 @@ def run(
         bool,
         typer.Option(
             "--replace",
-            help="Replace an earlier run of another robot, of other cases or candidates, once this is done.",
+            help="Replace an earlier run of another robot, other cases or candidates, or of more evidence.",
         ),
     ] = False,
     good: Annotated[
@@ -86,8 +86,8 @@ def run(
     Exit code 0: every bound holds; 1: a bound fails or cannot be decided, or a case could not be computed; 2: bad
     input; 4: nothing was held against a bound, so nothing is judged.
     """
+    from workbench.campaign.asked import with_good
     from workbench.campaign.evidence import Effort
-    from workbench.campaign.good import with_good
     from workbench.campaign.run import run_campaign
     from workbench.campaign.spec import campaign_names, load_campaign
     from workbench.commands.sweeps import dry_run as print_dry_run
@@ -109,7 +109,7 @@ def run(
         raise SpecError(f"{campaign}: --good {good:g}: a sweep counts its designs by sweep.good of the campaign")
     spec = with_good(spec, good)
     if dry_run:
-        print_dry_run(spec, file, model, values, effort, jobs, candidates or (), only or ())
+        print_dry_run(spec, file, model, values, effort, jobs, candidates or (), only or (), keep_going)
         return
     if sweep:
         try:

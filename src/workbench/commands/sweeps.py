@@ -16,6 +16,7 @@ from rich.text import Text
 
 from workbench import processes
 from workbench.campaign.evidence import Effort, check_engines
+from workbench.campaign.margins import IN_SWEEPS
 from workbench.campaign.spec import Campaign
 from workbench.campaign.verdict import WITHOUT_BOUND
 from workbench.console import err, out, print_changes, print_conclusion
@@ -100,10 +101,11 @@ def dry_run(
     jobs: int | None,
     candidates: Sequence[str | Path] = (),
     only: Sequence[str] = (),
+    keep_going: bool = False,
 ) -> None:
     """Print what a run would take; nothing is written."""
     check_engines(effort.engines)
-    found = estimate(campaign, file, model, settings, effort, jobs, candidates, only)
+    found = estimate(campaign, file, model, settings, effort, jobs, candidates, only, keep_going)
     out.print(Text(f"{campaign.name}: {found.cases} cases, {found.samples} samples"))
     workers = "worker" if found.jobs == 1 else "workers"
     out.print(Text(f"  time: about {duration(found.seconds)} with {found.jobs} {workers}"))
@@ -113,6 +115,8 @@ def dry_run(
         out.print(Text(f"  good: {100 * campaign.good:.3g} % is asked of {', '.join(found.measured)}"))
     if found.limited:
         out.print(Text(f"  actuators: limits of {', '.join(found.limited)} are held against every case"))
+    for line in found.left_out:
+        out.print(Text(f"  cannot be driven, left out: {line}"), soft_wrap=True)
     if campaign.sweep and not only:
         parts = [f"{found.tried_filtered} left out by the filter", f"{found.tried_failed} not passed"]
         out.print(Text(f"  of {found.tried} cases tried: {', '.join(parts)}"))
@@ -182,6 +186,8 @@ def print_sweep(outcome: SweepOutcome) -> None:
             numbers = (row["quantiles"]["0.5"], row["quantiles"]["0.95"], row["max"])
             table.add_row(row["candidate"], row["reference"], *map(show, numbers), row["worst_case"])
     out.print(table)
+    if outcome.manifest["actuators"]:
+        out.print(Text(IN_SWEEPS, style="yellow"))
     drivers = summary["drivers"][:SHOWN_DRIVERS]
     if drivers:
         listed = ", ".join(f"{d['key']} {d['rank_correlation']:+.2f}" for d in drivers)

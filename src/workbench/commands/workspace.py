@@ -34,6 +34,9 @@ def workspace(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Where it is written. Default: reports/workspace_MECHANISM.")
     ] = None,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Replace an earlier workspace of another robot, grid or range.")
+    ] = False,
 ) -> None:
     """Compute the reachable workspace by discretisation: volume with its error, cells as Parquet, figures."""
     from workbench.campaign.cases import resolve_cases
@@ -46,7 +49,7 @@ def workspace(
     from workbench.robots.catalogue import find_source
     from workbench.staging import check_output, staged
     from workbench.workspace.grid import compute_workspace
-    from workbench.workspace.store import WORKSPACE, workspace_facts, write_workspace
+    from workbench.workspace.store import WORKSPACE, refuse_other, workspace_facts, write_workspace
 
     values, relative = settings(set_ or [])
     robot = robot_with(model, values)
@@ -55,6 +58,8 @@ def workspace(
         robot = robot_with(model, table.layered(values, resolve_changes(table, robot.values, relative)))
     directory = out or Path("reports") / f"workspace_{robot.name}"
     check_output(directory, WORKSPACE)
+    if not replace:
+        refuse_other(directory, {"mechanism": robot.name, "parameters": dict(robot.values)})
     paths = {}
     if campaign:
         spec, file = load_campaign(campaign)
@@ -63,6 +68,8 @@ def workspace(
         show(0, 2)
         computed = compute_workspace(robot, grid, ranges(limit or []), settings(at or [], "--at")[0])
         show(1, 2)
+        if not replace:
+            refuse_other(directory, workspace_facts(computed, robot))
         with locked(directory), staged(directory, alone=True) as stage:
             write_workspace(stage, computed, robot)
             draw_workspace(stage, paths)

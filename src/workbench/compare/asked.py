@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from workbench.campaign.actuators import Margin, margins, unit_of
+from workbench.campaign.margins import Margin, margins, unit_of
 from workbench.report.manifest import Manifest
 from workbench.report.tables import NOT_COMPUTED
 

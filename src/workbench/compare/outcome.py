@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from workbench.campaign.actuators import answer, shortfalls
-from workbench.campaign.changed import few
+from workbench.campaign.changed import few, not_shared
 from workbench.campaign.good import YES
+from workbench.campaign.margins import answer, shortfalls
 from workbench.compare.errors import FACTOR, FLOOR, all_worse
 from workbench.compare.runs import RunComparison
 
 OK, WORSE, NOTHING = "ok", "worse", "nothing"
+IN_PART = "OK IN PART"
+"""Word where not all cases are in both runs."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,8 @@ class ComparisonOutcome:
     """of these, the actuators"""
     enough: str = ""
     """that its actuators are big enough, where they are"""
+    alone: str = ""
+    """what only one run has, and what is therefore not compared"""
     good: tuple[str, ...] = ()
     """whether formulas are good enough, in either run"""
 
@@ -57,9 +61,9 @@ def outcome_of(found: RunComparison, factor: float = FACTOR, floor: float = FLOO
     small = shortfalls(found.margins[1])
     held = found.margins[1]
     attention = (*small, *(one.sentence for one in found.answers[1] if one.answer != YES))
-    enough = answer(held, found.apart) if held and not small else ""
+    enough = answer(held, not_shared(found.apart)) if held and not small else ""
     key, word, sentence = _judged(found, worse, factor)
-    return ComparisonOutcome(key, word, sentence, worse, attention, tuple(small), enough, good)
+    return ComparisonOutcome(key, word, sentence, worse, attention, tuple(small), enough, _alone(found), good)
 
 
 def _judged(found: RunComparison, worse: Sequence[str], factor: float) -> tuple[str, str, str]:
@@ -67,7 +71,12 @@ def _judged(found: RunComparison, worse: Sequence[str], factor: float) -> tuple[
         return WORSE, "WORSE", f"{len(worse)} by more than a factor of {factor:g}, or by verdict."
     if not found.shared:
         return NOTHING, "NOTHING COMPARED", "the runs have no error in common."
+    word = IN_PART if found.apart else "OK"
+    return OK, word, f"nothing got worse by more than a factor of {factor:g}."
+
+
+def _alone(found: RunComparison) -> str:
     alone = sum(change.before is None or change.after is None for change in found.errors)
-    rest = f"; {alone} errors in one run only" if alone else ""
-    rest += f"; not computed in both: {few(list(found.apart))}" if found.apart else ""
-    return OK, "OK", f"nothing got worse by more than a factor of {factor:g}{rest}."
+    said = [f"{alone} errors in one run only"] if alone else []
+    said += [f"not computed in both: {few(list(found.apart))}"] if found.apart else []
+    return f"Left out: {'; '.join(said)}." if said else ""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.compare.errors import FLOOR
-from workbench.compare.outcome import NOTHING, OK, WORSE, ComparisonOutcome
+from workbench.compare.outcome import IN_PART, NOTHING, OK, WORSE, ComparisonOutcome
 from workbench.compare.runs import RunComparison
 from workbench.compare.sections import comparison_sections, in_short
 from workbench.report.build import html_page
@@ -21,6 +21,8 @@ OUTCOMES = {
     WORSE: Status("failed", "✗", "WORSE", loud=True),
     NOTHING: Status("unjudged", "–", "NOTHING COMPARED", loud=True),
 }
+PART = Status("undecided", "?", IN_PART, loud=True)
+"""Not all cases are in both runs."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,8 @@ def comparison_page(
             "title": title if title == (old.manifest.title or old.manifest.campaign) else f"{names[0]} and {names[1]}",
             "a": a,
             "b": b,
-            "status": OUTCOMES[outcome.key],
-            "sentence": outcome.sentence[:1].upper() + outcome.sentence[1:],
+            "status": PART if outcome.word == IN_PART else OUTCOMES[outcome.key],
+            "sentence": f"{outcome.sentence[:1].upper()}{outcome.sentence[1:]} {outcome.alone}".strip(),
             "attention": outcome.attention,
             "good": outcome.good,
             "other": [*([outcome.enough] if outcome.enough else []), *in_short(found)],

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from workbench.campaign.actuators import Margin
-from workbench.campaign.changed import few
+from workbench.campaign.changed import few, not_shared
 from workbench.campaign.good import Answer, answers
+from workbench.campaign.margins import Margin
 from workbench.compare.asked import Asked, demands, margins_of_both, reactions, shared_cases
 from workbench.compare.errors import ErrorChange, match_errors
 from workbench.compare.parameters import parameter_changes
@@ -99,7 +99,9 @@ def compare_loaded(old: Run, new: Run, good: float | None = None) -> RunComparis
     shared = set(shared_cases(old.manifest, new.manifest))
     apart = [name for name in dict.fromkeys([*old.manifest.cases, *new.manifest.cases]) if name not in shared]
     wanted = good or new.manifest.good or old.manifest.good
-    both = [tuple(answers([row for row in run.rows if row.case in shared], wanted, apart)) for run in (old, new)]
+    both = [
+        tuple(answers([row for row in run.rows if row.case in shared], wanted, not_shared(apart))) for run in (old, new)
+    ]
     limits = margins_of_both(old.manifest, new.manifest)
     return RunComparison(
         inputs=tuple(_inputs(old.manifest, new.manifest)),

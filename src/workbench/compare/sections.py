@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from workbench.campaign.actuators import answer, worst_of
+from workbench.campaign.changed import not_shared
+from workbench.campaign.margins import answer, worst_of
 from workbench.campaign.verdict import WITHOUT_BOUND
 from workbench.compare.asked import WORDS, Asked, shared_cases, worst_over_cases
 from workbench.compare.errors import FLOOR, ErrorChange, growth, growth_text
@@ -112,7 +113,7 @@ def asked_section(found: RunComparison) -> Section:
     said: list[str] = []
     for name, margins in zip("AB", found.margins, strict=True):
         if margins:
-            said.append(f"{name}: {answer(margins, found.apart)}")
+            said.append(f"{name}: {answer(margins, not_shared(found.apart))}")
     if not found.margins[1]:
         said.append(
             "Neither run says what the actuators can give; with [actuators.JOINT] in robot.toml or campaign this says"

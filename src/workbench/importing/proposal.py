@@ -18,6 +18,7 @@ from workbench.mjcf.refusal import Refusal
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
 from workbench.reference.crossings import look
+from workbench.reference.structure import refuse_large
 from workbench.reference.survey import Places, Survey, places, survey
 
 SAMPLES = 51
@@ -73,10 +74,11 @@ def propose(path: str | Path, actuated: tuple[str, ...] = ()) -> Proposal:
     Raises
     ------
     ModelError
-        The file cannot be read, is not safe, or does not compile.
+        The file cannot be read, is not safe, does not compile, or has too many joints.
     """
     found = find_model(path)
     prepared = open_source(read_text(found), str(path), found.parent)
+    refuse_large(prepared.user, str(path))
     seen = survey(prepared.user, actuated)
     where = places(prepared.user, seen)
     ignore = ("free bodies",) if seen.loose else ()

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.reference.closing import Rules
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import predict
 from workbench.reference.sides import NO_SIDES, UNKNOWN, SideTable, same_side, side_at, side_table
@@ -90,14 +91,16 @@ class Assembly:
 
     def at(self, rows: np.ndarray | slice) -> Assembly:
         """Some of the samples; with a slice, views."""
-        return Assembly(*(array[rows] for array in self._arrays()))
+        return Assembly(*(array[rows] for array in self.arrays))
 
     def put(self, rows: np.ndarray, other: Assembly, chosen: np.ndarray | slice = slice(None)) -> None:
         """Overwrite *rows* by the *chosen* samples of another assembly."""
-        for mine, others in zip(self._arrays(), other._arrays(), strict=True):
+        for mine, others in zip(self.arrays, other.arrays, strict=True):
             mine[rows] = others[chosen]
 
-    def _arrays(self) -> tuple[np.ndarray, ...]:
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """The arrays as the kernels take them."""
         return self.qpos, self.residual, self.tangent, self.rank, self.condition, self.weakest, self.side
 
 
@@ -246,6 +249,14 @@ class Continuation(ABC):
             active = active[done[active] < 1.0]
         return here, done >= 1.0
 
+    def rules(self, smallest: float = SMALLEST_STEP) -> Rules:
+        """The bounds above as the kernels take them."""
+        tolerance = self.tolerance
+        return Rules(
+            tolerance.residual, tolerance.floor, ASTRAY * tolerance.size, tolerance.few_digits, NEWTON_STEPS,
+            CORRECTION, LONGEST_STEP, ALMOST, NEGLIGIBLE, smallest,
+        )  # fmt: skip
+
     def _predict(self, here: Assembly, rows: np.ndarray, change: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Tangent predictor: distance moved by a change of the given coordinates, and where that leads."""
         moved, out = np.empty(len(rows)), np.empty((len(rows), here.qpos.shape[1]))
@@ -258,9 +269,9 @@ class Continuation(ABC):
         self.engine.in_blocks(lambda evaluator, _: results.append(self._newton(evaluator, qpos, aim)), 1)
         return results[0]
 
-    def _look_at_sides(self, rows: FloatArray, pattern: np.ndarray, columns: IntArray) -> None:
-        """From now on no step passes a singular pose; *rows* ``(m, nv)`` at home, and where they may not be zero."""
-        self._side_table = side_table(rows[:, columns], pattern[:, columns], columns)
+    def _look_at_sides(self, rows: FloatArray, pattern: np.ndarray, group: IntArray, columns: IntArray) -> None:
+        """From now on no step passes a singular pose; *rows* ``(m, nv)`` at home; *group* is the closure of each."""
+        self._side_table = side_table(rows[:, columns], pattern[:, columns], group, columns)
         self._home.side[:] = side_at(rows, columns, self._side_table)
 
     def _on_side(self, here: Assembly, rows: np.ndarray, closed: Assembly, wanted: np.ndarray) -> np.ndarray:
@@ -269,17 +280,20 @@ class Continuation(ABC):
         A configuration in a singular pose has no side and inherits the one that it was reached from.
         """
         before, after, table = here.side[rows], closed.side, self._side_table
-        if table.least == 0.0:
+        if not table.least.any():
             lost = after == UNKNOWN
             after[lost] = before[lost]
             square: np.ndarray = (before == UNKNOWN) | (before == after)
             return square
         # chosen rows may turn over among the others, where the mechanism does not
-        same: np.ndarray = (before == after) & (after != UNKNOWN)
+        lost = closed.rank < len(table.columns)  # in a singular pose, which is refused elsewhere
+        same: np.ndarray = ((before == after) & (after != UNKNOWN)) | lost
         doubtful = np.flatnonzero(wanted & ~same)
         if len(doubtful):
+            size, found = len(table.columns), np.zeros(len(doubtful), dtype=np.bool_)
             jacobians = self._solved(here.qpos[rows[doubtful]]), self._solved(closed.qpos[doubtful])
-            same[doubtful] = same_side(*jacobians, table)
+            same_side(*jacobians, table, np.empty((size, size)), found)
+            same[doubtful] = found
         return same
 
     def _nothing(self, samples: int, given: int) -> Assembly:
@@ -295,7 +309,7 @@ class Continuation(ABC):
 
     @abstractmethod
     def _solved(self, qpos: FloatArray) -> FloatArray:
-        """Jacobians ``(k, m, p)`` of what Newton solves for, columns in the order of the side table."""
+        """Rows ``(k, m, nv)`` that Newton solves, at configurations ``(k, nq)``."""
 
     @abstractmethod
     def _refuse(self, sample: int, target: FloatArray, reached: FloatArray, there: Assembly) -> None:

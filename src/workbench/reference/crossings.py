@@ -149,7 +149,8 @@ def _contacts(user: mujoco.MjModel, poses: FloatArray, home: FloatArray) -> tupl
     if not (user.geom_contype | user.geom_conaffinity).any() and not user.npair:
         return [], []
     before = [(one.one, one.two) for one in touches(user, home[None]) if one.depth > TOUCHING]
-    new = [one for one in touches(user, poses) if one.depth > TOUCHING and (one.one, one.two) not in before]
+    known = set(before)
+    new = [one for one in touches(user, poses) if one.depth > TOUCHING and (one.one, one.two) not in known]
     looked = min(len(poses), MOST_POSES)
     notes = []
     if before:

@@ -13,7 +13,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError, ParameterError
-from workbench.reference.closure import LoopCloser, constraint_jacobian
+from workbench.reference.closure import LoopCloser, loop_rows
 from workbench.reference.continuation import ASTRAY, NEWTON_STEPS, Assembly, Continuation
 from workbench.reference.engine import Evaluator
 from workbench.reference.platform_kernels import platform_accelerations, platform_jacobian, platform_newton
@@ -81,9 +81,16 @@ class PlatformCloser(Continuation):
         self._sign = np.ones(1)
         self._home = self._newton_alone(self.home[None, :].copy(), self.start[None, :])
         self._sign = self._signs(self._home)
+        pattern, group = pattern_of(structure, self.joints[2])
         moved = np.tile(structure.moves[self._site[0]], (len(leading), 1))
-        pattern = np.concatenate([pattern_of(structure, self.joints[2]), moved])
-        self._look_at_sides(self._all_rows(self.home), pattern, np.arange(model.nv))
+        # the task coordinates are of one body
+        task_group = np.full(len(leading), len(structure.blocks))
+        self._look_at_sides(
+            self._solved(self.home[None, :])[0],
+            np.concatenate([pattern, moved]),
+            np.concatenate([group, task_group]),
+            np.arange(model.nv),
+        )
 
     def accelerations(
         self, assembly: Assembly, x: FloatArray, xd: FloatArray, xdd: FloatArray
@@ -152,13 +159,9 @@ class PlatformCloser(Continuation):
         self.engine.in_blocks(block, n)
         return rows, values
 
-    def _all_rows(self, qpos: FloatArray) -> FloatArray:
-        """Rows of the loops, then of the task coordinates, of one configuration: ``(m, nv)``."""
-        loops = constraint_jacobian(self.engine, self.structure, self.joints, qpos[None, :])[0]
-        return np.concatenate([loops, self._rows(qpos[None, :], self.start[None, :])[0][0]])
-
     def _solved(self, qpos: FloatArray) -> FloatArray:
-        return np.stack([self._all_rows(one) for one in qpos])[:, :, self._side_table.columns]
+        loops = loop_rows(self.engine, self.tables, qpos)
+        return np.concatenate([loops, self._rows(qpos, np.tile(self.start, (len(qpos), 1)))[0]], axis=1)
 
     def _newton(self, evaluator: Evaluator, start: FloatArray, aim: FloatArray) -> Assembly:
         count = len(start)

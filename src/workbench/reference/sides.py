@@ -11,13 +11,12 @@ are no good measure, the two Jacobians themselves are compared.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.compiled import compiled
+from workbench.compiled import compiled, inlined
 from workbench.reference.kinds import CONNECT, JOINT, SPIN, TENDON, WELD
 from workbench.reference.linear import factor
 from workbench.reference.structure import IntArray, Structure
@@ -25,8 +24,9 @@ from workbench.reference.structure import IntArray, Structure
 UNKNOWN = -1
 """No side: the Jacobian has not full rank, or the chosen rows are no good measure of it."""
 
-POOR = 0.1
-"""Part of the volume that the chosen rows hold, against home, below which they are no good measure of all rows."""
+POOR = 0.01
+"""Of a block's determinant at home, below which the chosen rows are no good measure of all rows (or the pose is almost
+singular)."""
 
 MOST_BITS = 62
 
@@ -40,56 +40,99 @@ class SideTable(NamedTuple):
     """``(p,)`` velocity addresses, likewise"""
     starts: IntArray
     """``(blocks + 1,)``"""
-    least: float
-    """part of the volume that chosen rows must hold; zero where all rows are chosen"""
+    sizes: FloatArray
+    """``(blocks,)`` the mean size of pivots at home"""
+    least: FloatArray
+    """``(blocks,)`` part of the determinant at home that must be left; zero where all rows are chosen"""
+    group_starts: IntArray
+    """``(blocks + 1,)``"""
+    group_rows: IntArray
+    """``(m,)`` all rows of the closures of each block, chosen or not, block after block"""
 
 
-NO_SIDES = SideTable(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64), 0.0)
+_NONE = np.zeros(0, dtype=np.int64)
+NO_SIDES = SideTable(
+    _NONE, _NONE, np.zeros(1, dtype=np.int64), np.zeros(0), np.zeros(0), np.zeros(1, dtype=np.int64), _NONE
+)
 """Nothing is looked at: every configuration is on side 0."""
 
 
+@inlined
+def _eliminate(a, mean):  # type: ignore[no-untyped-def]
+    """Whether the determinant of ``a (p, p)``, overwritten, is negative, and its size over ``mean^p``, -1 for zero."""
+    negative, volume = False, 1.0
+    p = a.shape[0]
+    for k in range(p):
+        pivot = k
+        for i in range(k + 1, p):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        if pivot != k:
+            negative = not negative
+            for j in range(k, p):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        if not abs(a[k, k]) > 0.0:
+            return False, -1.0
+        negative ^= a[k, k] < 0.0
+        volume *= abs(a[k, k]) / mean
+        for i in range(k + 1, p):
+            scale = a[i, k] / a[k, k]
+            if scale != 0.0:
+                for j in range(k + 1, p):
+                    a[i, j] -= scale * a[k, j]
+    return negative, volume
+
+
 @compiled
-def side_of(jac, factored, rank, table, work):  # type: ignore[no-untyped-def]
+def side_of(jac, rank, table, work):  # type: ignore[no-untyped-def]
     """Side of one sample: a bit for each block, set where its determinant is negative, or `UNKNOWN`.
 
-    ``jac (m, nv)`` are the rows; ``factored (m, p)`` and ``rank`` are what `linear.factor` made of the columns that are
-    solved for; ``work (p, p)`` is overwritten.
+    ``jac (m, nv)`` are the rows, ``rank`` that of the columns that are solved for; ``work (p, p)`` is overwritten.
     """
     rows, columns, starts = table.rows, table.columns, table.starts
     if rank < rows.shape[0]:
         return UNKNOWN
-    side, volume = 0, 1.0
+    side = 0
     for block in range(starts.shape[0] - 1):
         first, size = starts[block], starts[block + 1] - starts[block]
         a = work[:size, :size]
         for i in range(size):
             for j in range(size):
                 a[i, j] = jac[rows[first + i], columns[first + j]]
-        negative = False
-        for k in range(size):
-            pivot = k
-            for i in range(k + 1, size):
-                if abs(a[i, k]) > abs(a[pivot, k]):
-                    pivot = i
-            if pivot != k:
-                negative = not negative
-                for j in range(k, size):
-                    a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-            if not abs(a[k, k]) > 0.0:
-                return UNKNOWN
-            negative ^= a[k, k] < 0.0
-            volume *= abs(a[k, k] / factored[first + k, first + k])
-            for i in range(k + 1, size):
-                scale = a[i, k] / a[k, k]
-                if scale != 0.0:
-                    for j in range(k + 1, size):
-                        a[i, j] -= scale * a[k, j]
+        negative, volume = _eliminate(a, table.sizes[block])
+        if volume < table.least[block]:
+            return UNKNOWN
         if negative:
             side ^= 1 << (block % MOST_BITS)
-    return side if volume >= table.least else UNKNOWN
+    return side
 
 
-def side_table(jacobian: FloatArray, pattern: np.ndarray, columns: IntArray) -> SideTable:
+@compiled
+def same_side(before, after, table, work, same):  # type: ignore[no-untyped-def]
+    """Fill ``same (k,)``: which of these rows ``(k, m, nv)`` of neighbours are turned over in no block.
+
+    With ``A T = B`` in least squares, A a block before and B after, T is near one for near neighbours; its determinant
+    has the sign of that of ``A^T B``, and is negative beyond a singular pose.
+    """
+    rows, columns = table.group_rows, table.columns
+    for s in range(before.shape[0]):
+        same[s] = True
+        for block in range(table.starts.shape[0] - 1):
+            first, size = table.starts[block], table.starts[block + 1] - table.starts[block]
+            a = work[:size, :size]
+            mean = 1e-300
+            for i in range(size):
+                for j in range(size):
+                    value = 0.0
+                    for r in range(table.group_starts[block], table.group_starts[block + 1]):
+                        value += before[s, rows[r], columns[first + i]] * after[s, rows[r], columns[first + j]]
+                    a[i, j] = value
+                    mean = max(mean, abs(value))
+            negative, volume = _eliminate(a, mean)
+            same[s] &= volume >= 0.0 and not negative
+
+
+def side_table(jacobian: FloatArray, pattern: np.ndarray, group: IntArray, columns: IntArray) -> SideTable:
     """Choose rows and blocks at home.
 
     Parameters
@@ -98,6 +141,8 @@ def side_table(jacobian: FloatArray, pattern: np.ndarray, columns: IntArray) -> 
         ``(m, p)`` of what is solved for, in the home pose.
     pattern
         ``(m, p)`` where it may differ from zero in any pose.
+    group
+        ``(m,)`` the closure that each row belongs to; rows of one closure stay in one block.
     columns
         ``(p,)`` velocity addresses.
     """
@@ -106,7 +151,7 @@ def side_table(jacobian: FloatArray, pattern: np.ndarray, columns: IntArray) -> 
     from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
     m, p = jacobian.shape
-    if m < p or not p:
+    if m < p or not p or np.linalg.matrix_rank(jacobian) < p:
         return NO_SIDES
     chosen = np.arange(m) if m == p else np.sort(qr(jacobian.T, mode="r", pivoting=True)[1][:p])
     square = pattern[chosen]
@@ -114,48 +159,49 @@ def side_table(jacobian: FloatArray, pattern: np.ndarray, columns: IntArray) -> 
     matched = np.asarray(maximum_bipartite_matching(csr_array(square), perm_type="column"), dtype=np.int64)
     if (matched < 0).any():
         return NO_SIDES
-    by_column = np.zeros((p, p), dtype=np.bool_)
-    by_column[matched] = square
-    count, labels = connected_components(csr_array(by_column), connection="strong")
-    order = np.argsort(labels, kind="stable")
-    row_of = np.empty(p, dtype=np.int64)
-    row_of[matched] = chosen
-    table = SideTable(
-        row_of[order].astype(np.int64),
-        np.asarray(columns, dtype=np.int64)[order],
-        np.concatenate([[0], np.cumsum(np.bincount(labels, minlength=count))]).astype(np.int64),
-        0.0,
+    depends = np.zeros((p, p), dtype=np.bool_)
+    depends[matched] = square
+    for one in np.unique(group[chosen]):
+        together = matched[group[chosen] == one]
+        depends[np.ix_(together, together)] = True
+    count, labels = connected_components(csr_array(depends), connection="strong")
+    rows, places, group_rows, sizes, least = [], [], [], [], []
+    for block in range(count):
+        mine = np.flatnonzero(labels == block)
+        own = chosen[np.isin(matched, mine)]
+        whole = np.flatnonzero(np.isin(group, group[own]))
+        rows.append(own)
+        places.append(mine)
+        group_rows.append(whole)
+        sizes.append(float(np.exp(np.linalg.slogdet(jacobian[np.ix_(own, mine)])[1] / len(mine))))
+        least.append(POOR if len(whole) > len(own) else 0.0)
+    return SideTable(
+        np.concatenate(rows).astype(np.int64),  # pivots of LAPACK are shorter, and another type for the kernels
+        np.asarray(columns, dtype=np.int64)[np.concatenate(places)],
+        _starts(rows),
+        np.array(sizes),
+        np.array(least),
+        _starts(group_rows),
+        np.concatenate(group_rows),
     )
-    if m == p:
-        return table
-    whole, part = 0.5 * np.linalg.slogdet(jacobian.T @ jacobian)[1], np.linalg.slogdet(jacobian[chosen])[1]
-    return table._replace(least=POOR * math.exp(part - whole)) if np.isfinite([whole, part]).all() else NO_SIDES
+
+
+def _starts(parts: list[np.ndarray]) -> IntArray:
+    return np.concatenate([[0], np.cumsum([len(part) for part in parts])]).astype(np.int64)
 
 
 def side_at(jacobian: FloatArray, columns: IntArray, table: SideTable) -> int:
     """Side of one configuration with rows ``(m, nv)``, of which *columns* are solved for."""
-    factored = np.asfortranarray(jacobian[:, columns])
     p = len(columns)
-    rank = factor(factored, np.empty(p), np.empty(p, dtype=np.int64))
-    return int(side_of(jacobian, factored, rank, table, np.empty((p, p))))
+    rank = factor(np.ascontiguousarray(jacobian[:, columns]), np.empty(p), np.empty(p, dtype=np.int64))
+    return int(side_of(jacobian, rank, table, np.empty((p, p))))
 
 
-def same_side(before: FloatArray, after: FloatArray, table: SideTable) -> np.ndarray:
-    """Which of these Jacobians ``(k, m, p)`` of neighbours are turned over in no block, ``(k,)``.
+def pattern_of(structure: Structure, dof_of: IntArray) -> tuple[np.ndarray, IntArray]:
+    """Where rows of the loop closures ``(m, nv)`` may differ from zero in a closed pose, and closures ``(m,)`` of rows.
 
-    Columns are in the order of the table. With ``before T = after`` in least squares T is near one for near neighbours;
-    beyond a singular pose, the determinant of a block of it is negative.
+    ``dof_of (njnt,)`` is the velocity address of each joint.
     """
-    same = np.ones(len(before), dtype=np.bool_)
-    for k in range(len(before)):
-        change = np.linalg.lstsq(before[k], after[k], rcond=None)[0]
-        for first, end in zip(table.starts[:-1], table.starts[1:], strict=True):
-            same[k] &= np.linalg.slogdet(change[first:end, first:end])[0] > 0.0
-    return same
-
-
-def pattern_of(structure: Structure, dof_of: IntArray) -> np.ndarray:
-    """Where rows of the loop closures ``(m, nv)`` may differ from zero in a closed pose; *dof_of* each joint."""
     pattern = np.zeros((structure.rows, structure.moves.shape[1]), dtype=np.bool_)
     for block, first, end in zip(structure.blocks, structure.block_rows[:-1], structure.block_rows[1:], strict=True):
         kind, one, two, left, right = (int(entry) for entry in block)
@@ -170,4 +216,4 @@ def pattern_of(structure: Structure, dof_of: IntArray) -> np.ndarray:
                     pattern[first:end, dof_of[element]] = True
                 elif element >= 0 and kind == TENDON:
                     pattern[first:end, dof_of[structure.tendons[element] != 0.0]] = True
-    return pattern
+    return pattern, np.repeat(np.arange(len(structure.blocks)), np.diff(structure.block_rows)).astype(np.int64)

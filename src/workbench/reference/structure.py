@@ -13,6 +13,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.dry_friction import direction
 from workbench.errors import ModelError
+from workbench.limits import MOST_FREEDOMS
 from workbench.mjcf.compile import custom_text
 from workbench.mjcf.lines import with_lines
 from workbench.mjcf.refusal import Refusal, joined
@@ -162,6 +163,7 @@ def read_structure(model: mujoco.MjModel, file: str) -> Structure:
         Something the projection does not cover (contacts, limits, spatial tendons' equalities ...). The message joins
         all of it; ``error.facts["refusals"]`` holds one `Refusal` each.
     """
+    refuse_large(model, file)
     found = _read(model)
     if found.refusals:
         raise joined(file, found.refusals)
@@ -207,6 +209,24 @@ def read_structure(model: mujoco.MjModel, file: str) -> Structure:
         rods=rods,
         notes=tuple(note for _, _, note in judged if note),
     )
+
+
+def refuse_large(model: mujoco.MjModel, file: str) -> None:
+    """Refuse a file of so many joints that no answer would come in sensible time.
+
+    Raises
+    ------
+    ModelError
+        More freedoms than `limits.MOST_FREEDOMS`.
+    """
+    if model.nv > MOST_FREEDOMS:
+        raise ModelError(
+            f"{file}: joints with {model.nv} freedoms; allowed: {MOST_FREEDOMS}; weld parts together, or take joints"
+            " out that the mechanism does not need",
+            file=file,
+            value=model.nv,
+            limit=MOST_FREEDOMS,
+        )
 
 
 def _named(model: mujoco.MjModel, kind: mujoco.mjtObj, key: str, element: str) -> tuple[int, list[Refusal]]:

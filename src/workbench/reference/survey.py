@@ -26,6 +26,12 @@ LOOSE = 1e-7
 INDEPENDENT = 1e-6
 """How much of a motion a joint must take part in to be counted as its driver."""
 
+ALONE = 1e-12
+"""A column shorter than one by less belongs to a joint that no loop ties to another."""
+
+ROUNDING = 1e-9
+"""Shares of joints in a motion that differ by less are equal."""
+
 SHARE = 0.1
 """How much, of the most active joint, a joint near the base must take part in a motion to be preferred."""
 
@@ -81,39 +87,33 @@ def survey(model: mujoco.MjModel, wanted: tuple[str, ...] = ()) -> Survey:
     candidates = list(wanted) or _file_joints(model)
     dofs = {_joint(model, j): int(model.jnt_dofadr[j]) for j in range(model.njnt) if _scalar(model, j)}
     place = {int(dof): column for column, dof in enumerate(moving)}
+    able = {name: place[dof] for name, dof in dofs.items() if dof in place}
+    rest = _Rest(motions)
     chosen: list[str] = []
-    basis = np.zeros((0, len(motions)))
     dropped: list[str] = []
     for name in candidates:
-        if name not in dofs or dofs[name] not in place:
+        if name not in able:
             continue
-        more = np.vstack([basis, motions[:, place[dofs[name]]]])
-        if np.linalg.matrix_rank(more, tol=INDEPENDENT) > len(basis):
-            basis = more
-            chosen.append(name)
-        elif wanted:
+        if rest.take(able[name]) or wanted:
             chosen.append(name)
         else:
             dropped.append(name)
     added: list[str] = []
-    while not wanted and len(basis) < len(motions):
-        left = _beyond(motions, basis)
-        scores = {name: float(np.linalg.norm(left[:, place[dof]])) for name, dof in dofs.items() if dof in place}
-        most = max(scores.values(), default=0.0)
-        if most < INDEPENDENT:
-            break
-        # of joints that take part well, the one nearest to the base: that is where motors are
-        able = [name for name in scores if scores[name] > SHARE * most]
-        best = min(able, key=lambda name: (_depth(model, dofs[name]), -scores[name]))
-        basis = np.vstack([basis, motions[:, place[dofs[best]]]])
-        chosen.append(best)
-        added.append(best)
+    if not wanted:
+        names, columns = list(able), np.array(list(able.values()), dtype=np.int64)
+        depths = np.array([_depth(model, dofs[name]) for name in names], dtype=np.int64)
+        while rest.freedoms:
+            best = _nearest_to_base(rest.scores[columns], depths)
+            if best < 0 or not rest.take(int(columns[best])):
+                break
+            added.append(names[best])
+        chosen += added
     loops = int(np.count_nonzero(model.eq_active0)) if model.neq else 0
-    nameless = _nameless(model, place) if len(motions) > len(basis) else ()
+    nameless = _nameless(model, place) if rest.freedoms else ()
     return Survey(
         bodies=model.nbody - 1, joints=model.njnt, loops=loops, rows=len(jacobian), rank=rank, mobility=len(motions),
         residual=residual, qpos=qpos, fix_base=fix_base, loose=loose, actuated=tuple(chosen), dropped=tuple(dropped),
-        added=tuple(added), undriven=len(motions) - len(basis), nameless=nameless,
+        added=tuple(added), undriven=rest.freedoms, nameless=nameless,
     )  # fmt: skip
 
 
@@ -136,13 +136,61 @@ def _depth(model: mujoco.MjModel, dof: int) -> int:
     return depth
 
 
-def _beyond(motions: FloatArray, basis: FloatArray) -> FloatArray:
-    """The part of the motions ``(f, n)`` in which the joints chosen so far, rows of *basis* ``(k, f)``, rest."""
-    if not len(basis):
-        return motions
-    rest = np.linalg.svd(basis, full_matrices=True)[2][np.linalg.matrix_rank(basis, tol=INDEPENDENT) :]
-    found: FloatArray = rest @ motions
-    return found
+class _Rest:
+    """The motions ``(f, n)``, orthonormal, in which the joints taken so far rest: a step of Gram and Schmidt for each.
+
+    What a joint does is its column. A joint that no loop ties to another has a column of length one, at right angles to
+    all others, and costs nothing.
+    """
+
+    def __init__(self, motions: FloatArray) -> None:
+        self._motions = motions
+        self._squares = np.einsum("ij,ij->j", motions, motions)
+        self._taken = np.zeros((0, len(motions)))  # grows by doubling
+        self._count = 0
+        self.freedoms = len(motions)
+        """how many motions are left"""
+
+    @property
+    def scores(self) -> FloatArray:
+        """How much each joint takes part in what is left, ``(n,)``, 0 to 1."""
+        found: FloatArray = np.sqrt(np.maximum(self._squares, 0.0))
+        return found
+
+    def take(self, column: int) -> bool:
+        """Let a joint rest, too; False where what is left does not move it."""
+        way = self._motions[:, column]
+        if self._squares[column] > 1.0 - ALONE:
+            self._squares[column] = 0.0
+            self.freedoms -= 1
+            return True
+        for _ in range(2):  # twice is enough for right angles
+            taken = self._taken[: self._count]
+            way = way - taken.T @ (taken @ way)
+        length = float(np.linalg.norm(way))
+        if length <= INDEPENDENT:
+            self._squares[column] = 0.0
+            return False
+        if self._count == len(self._taken):
+            more = np.zeros((max(8, self._count), len(way)))
+            self._taken = np.vstack([self._taken, more])
+        self._taken[self._count] = way / length
+        self._count += 1
+        self._squares -= (way / length @ self._motions) ** 2
+        self._squares[column] = 0.0
+        self.freedoms -= 1
+        return True
+
+
+def _nearest_to_base(scores: FloatArray, depths: np.ndarray) -> int:
+    """Of joints that take part well, the one nearest to the base, where motors are; -1 where none does."""
+    most = float(scores.max(initial=0.0))
+    if most < INDEPENDENT:
+        return -1
+    able = scores > SHARE * most
+    near = able & (depths == depths[able].min())
+    # equal but for rounding: the first of the file
+    return int(np.argmax(near & (scores >= scores[near].max() - ROUNDING)))
 
 
 def _standing(model: mujoco.MjModel) -> tuple[str, tuple[str, ...], np.ndarray]:

@@ -16,6 +16,12 @@ from numpy.typing import NDArray
 
 from workbench.arrays import FloatArray
 
+HEADLIGHT = {"ambient": 0.1, "diffuse": 0.4, "specular": 0.5}
+"""What MuJoCo gives a model that says nothing."""
+SKY = np.array([[245, 247, 252], [199, 212, 230]])
+"""Colours behind a robot whose file has no sky, above and below: those of the robots that come along."""
+FAR = 0.999
+"""Share of the farthest depth from which on nothing was drawn."""
 MODEL, POSES = "model.mjb", "qpos.npy"
 
 
@@ -24,13 +30,35 @@ def rendered(
 ) -> Iterator[NDArray[np.uint8]]:
     """Draw each row of *poses* ``(n, nq)``: pictures ``(height, width, 3)``."""
     model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+    light_up(model)
+    bare = not np.any(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     data = mujoco.MjData(model)
     with mujoco.Renderer(model, height, width) as renderer:
         for qpos in poses:
             data.qpos = qpos
             mujoco.mj_forward(model, data)
             renderer.update_scene(data, camera or -1)
-            yield np.ascontiguousarray(renderer.render())
+            picture = np.ascontiguousarray(renderer.render())
+            if bare:
+                renderer.enable_depth_rendering()
+                put_behind(picture, renderer.render() >= FAR * model.vis.map.zfar * model.stat.extent)
+                renderer.disable_depth_rendering()
+            yield picture
+
+
+def light_up(model: mujoco.MjModel) -> None:
+    """Give a model without a light of its own one that shows it, in memory; MuJoCo's is dim."""
+    head = model.vis.headlight
+    given = any(not np.allclose(getattr(head, name), value) for name, value in HEADLIGHT.items())
+    if model.nlight == 0 and head.active and not given:
+        head.ambient, head.diffuse, head.specular = [0.4] * 3, [0.5] * 3, [0.1] * 3
+
+
+def put_behind(picture: NDArray[np.uint8], empty: NDArray[np.bool_]) -> None:
+    """Put a bright background where nothing was drawn, in place: dark parts cannot be seen on MuJoCo's black."""
+    share = np.linspace(0.0, 1.0, len(picture))[:, None]
+    rows = np.rint((1 - share) * SKY[0] + share * SKY[1]).astype(np.uint8)
+    picture[empty] = np.broadcast_to(rows[:, None, :], picture.shape)[empty]
 
 
 def draw(folder: Path, width: int, height: int, camera: str) -> None:

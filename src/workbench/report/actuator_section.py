@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from workbench.campaign.actuators import Margin, answer, shortfalls, worst_of
+from workbench.campaign.margins import Margin, answer, shortfalls, worst_of
 from workbench.report.attention import margins_of, unknown_cases
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
@@ -76,7 +76,7 @@ def limits_table(found: list[Margin], anchors: Mapping[str, str]) -> Table:
         "actuator-limits",
         "Actuators against their limits: of each limit the case that takes most of it.",
         columns(
-            ("Actuator", "Figure", *numeric[:3], "Case", "At", "Cases beyond", "", "Source of the limit"),
+            ("Actuator", "Figure", *numeric[:3], "Case", "At", "Cases beyond", "Big enough", "Source of the limit"),
             (*numeric, "Cases beyond"),
         ),
         tuple(rows),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from workbench.campaign.actuators import Margin, margins, shortfalls
+from workbench.campaign.changed import not_known
 from workbench.campaign.good import YES, answers
+from workbench.campaign.margins import Margin, margins, shortfalls
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
 from workbench.report.tables import NOT_COMPUTED
@@ -21,9 +22,9 @@ def attention(run: Run) -> list[str]:
     ]
 
 
-def unknown_cases(manifest: Manifest) -> list[str]:
-    """Cases that were not computed."""
-    return [name for name, record in manifest.cases.items() if record.status in NOT_COMPUTED]
+def unknown_cases(manifest: Manifest) -> str:
+    """Say of which cases nothing is known, since they were not computed; empty where there are none."""
+    return not_known([name for name, record in manifest.cases.items() if record.status in NOT_COMPUTED])
 
 
 def margins_of(manifest: Manifest) -> list[Margin]:

@@ -8,7 +8,7 @@ import gc
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
 from workbench.report.bibliography import NAME, bibliography, cited_keys
 from workbench.report.cost import cost_table
-from workbench.report.data_out import DATA_FORMATS, data_files
+from workbench.report.drawing import Show, draw
 from workbench.report.latex import latex_table
 from workbench.report.load import Run, load_run, read_manifest
 from workbench.report.paper_table import paper_table
@@ -36,14 +36,8 @@ FIGURES = "figures"
 TABLES = "tables"
 _OWN_FIGURE = re.compile(r"(?:case|figure)-[a-z0-9-]+\.(?:svg|pdf)")
 _OWN_TABLE = re.compile(r"[a-z0-9-]+\.tex")
-COLLECT_EVERY = 60
-"""Figures between two collections of garbage."""
-
+DATA_FORMATS = ("csv", "mat")
 FORMATS = ("html", "md", "pdf", *DATA_FORMATS)
-
-
-Show = Callable[[int, int], None]
-"""Called with the number of figures that are drawn, and of all."""
 
 
 def build_report(
@@ -52,6 +46,8 @@ def build_report(
     style: str = "page",
     show: Show | None = None,
     paper: str = "a4",
+    *,
+    second: bool = False,
 ) -> list[Path]:
     """Write the report of a finished run beside its results.
 
@@ -69,6 +65,8 @@ def build_report(
         See `Show`.
     paper
         ``a4`` or ``letter``: the pages of report.pdf.
+    second
+        Whether a copy of this process may help to draw; not for programs with threads of their own.
 
     Returns
     -------
@@ -94,11 +92,14 @@ def build_report(
         run = load_sweep(run_dir, manifest)
         sections = sweep_sections(run)
     with figure_style(style), _few_collections():
-        files = _rendered(run, sections, formats, style, paper, show)
+        files = _rendered(run, sections, formats, style, paper, show, second)
     wanted = tuple(name for name in formats if name in DATA_FORMATS)
     if wanted and manifest.sweep is not None:
         raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; a sweep's data are Parquet")
-    files |= data_files(run_dir, wanted) if wanted else {}
+    if wanted:
+        from workbench.report.data_out import data_files  # pandas takes longer to load than a page to write
+
+        files |= data_files(run_dir, wanted)
     for place in {path.parent for path in files} - {run_dir}:
         if place.is_symlink():
             raise OutputError(f"{place}: is a symbolic link; a report is written into its run directory alone")
@@ -124,24 +125,26 @@ def _check_choice(what: str, given: Sequence[str], allowed: Iterable[str]) -> No
 
 
 def _rendered(
-    run: Run | SweepRun, sections: list[Section], formats: Sequence[str], style: str, paper: str, show: Show | None
+    run: Run | SweepRun,
+    sections: list[Section],
+    formats: Sequence[str],
+    style: str,
+    paper: str,
+    show: Show | None,
+    second: bool,
 ) -> dict[Path, bytes]:
     files: dict[Path, bytes] = {}
     if "pdf" in formats:
         from workbench.report.pdf import all_tables, figure_pdf, report_pdf  # Typst is loaded where it is needed
     figures = run.directory / FIGURES
     plots = [plot for section in sections for plot in section.plots]
-    for number, plot in enumerate(plots):
-        if show:
-            show(number, len(plots))
-        if number % COLLECT_EVERY == COLLECT_EVERY - 1:
-            gc.collect()
+    if {"html", "md", "pdf"} & {*formats}:
+        draw(plots, show, second=second)
+    for plot in plots:
         if "md" in formats:
             files[figures / f"{plot.key}.svg"] = standalone(plot.svg, plot.alt).encode()
         if "pdf" in formats:
             files[figures / f"{plot.key}.pdf"] = figure_pdf(plot, style)
-        if "html" in formats:
-            _ = plot.svg  # drawn here, where garbage is taken care of
     if "md" in formats:
         files[run.directory / "report.md"] = render_markdown(run, sections).encode()
     if "html" in formats:
@@ -180,6 +183,7 @@ def html_page(template: str, sections: Sequence[Section], head: Mapping[str, Any
         **head,
         sections=bodies,
         style=Markup(style + sheet.rules),
+        shapes=Markup(sheet.shapes),
         script=Markup(script),
         script_hash=f"sha256-{digest}",
     )

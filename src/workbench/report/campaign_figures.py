@@ -80,7 +80,7 @@ def error_over_plot(run: Run, record: FigureRecord, key: str) -> Plot | str:
     shown = [joint for joint in joints if any((name, joint) not in rounding for name in names)]
     # a panel a joint; what is nothing but rounding would squeeze the others together and has one of its own
     panels = [[line for line in lines if line[1] == joint and line not in rounding] for joint in shown]
-    labels = [f"{joint}, peak error" for joint in shown]
+    labels = [f"{torque_label(joint, run.manifest.unit_of(joint)).partition(' [')[0]}, peak error" for joint in shown]
     if rounding:
         panels.append([line for line in lines if line in rounding])
         labels.append("rounding")

@@ -24,9 +24,10 @@ from workbench.report.mechanism import mechanism_plot
 from workbench.report.pictures import Film
 from workbench.report.plot import Plot
 from workbench.report.recorded import recorded_tables
+from workbench.report.signed import signed_plot
 from workbench.report.spent import spent_plot, spent_table
 from workbench.report.tables import CASE_STATUS, KINDS, Cell, Status, Table, columns, verdict_status
-from workbench.report.text import error_fraction, exact, percent, scientific, torque_label, with_unit
+from workbench.report.text import error_fraction, exact, percent, pretty_unit, scientific, torque_label, with_unit
 
 ERRORS_DEFINED = (
     "Peak error is max|Δτ| / max|τ_ref|, rms error is rms(Δτ) / rms(τ_ref), both per joint over the whole case, so "
@@ -52,7 +53,10 @@ class CaseView:
     mechanism: Plot | None
     reactions: Plot | None
     spent: Plot | None
+    signed: Plot | None
     tables: tuple[Table, ...]
+    signed_units: str = ""
+    """of `signed`: N, N·m, or both"""
     film: Film | None = None
     """rendered pictures of the robot in this case, or why there are none; on one case of a run"""
     times: str = ""
@@ -66,7 +70,7 @@ class CaseView:
     @property
     def plots(self) -> tuple[Plot, ...]:
         """All figures of the case."""
-        others = tuple(plot for plot in (self.spent, self.mechanism, self.reactions) if plot is not None)
+        others = tuple(plot for plot in (self.signed, self.spent, self.mechanism, self.reactions) if plot is not None)
         return self.motion + self.torques + others
 
 
@@ -96,8 +100,10 @@ def case_view(run: Run, case: str, anchor: str, series: Series | None, film: Fil
         torques=tuple(torque_plots(run, case, anchor, series)) if series is not None else (),
         mechanism=mechanism_plot(run, case, anchor, series) if series is not None else None,
         reactions=reaction_plot(run, case, anchor, series) if series is not None else None,
+        signed=signed_plot(run, case, anchor, series) if series is not None else None,
         spent=spent_plot(run, case, anchor, series) if series is not None else None,
         tables=tuple(table for table in tables if table.rows),
+        signed_units=" and ".join(dict.fromkeys(pretty_unit(unit) for unit in run.manifest.force_units)),
         film=film if film is not None and film.case == case else None,
         times=_times(rows, series) if series is not None else "",
     )
@@ -177,7 +183,7 @@ def _error_table(run: Run, case: str, kind: str, rows: list[ErrorRow], anchor: s
     for row in rows:
         total = f" of {samples}" if samples is not None else ""
         cells = [
-            Cell(row.joint),
+            Cell(joint_heading(run, row.joint)),
             Cell(row.candidate),
             Cell(row.reference),
             Cell(number(row.peak_error), row.peak_error, emphasis=True),

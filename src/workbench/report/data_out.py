@@ -13,7 +13,6 @@ import pandas as pd
 from workbench.report.frames import RunFrames, load_run
 
 DATA = "data"
-DATA_FORMATS = ("csv", "mat")
 LONGEST_NAME = 63
 """Characters of a MATLAB name."""
 

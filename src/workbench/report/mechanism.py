@@ -21,11 +21,15 @@ SIZE = (9.0, 3.6)
 NARROW = 7.0
 """Inches below which panels stand close together: in the style of a paper."""
 UPWARDS = "upwards [m]"
+SKETCH, FLAT = (4.4, 3.4), (5.8, 4.2)
+"""inches: of the first screen's picture, and of a planar robot's drawing"""
+PLANAR, THICKEST, UPRIGHT = 1e-6, 0.5, 0.5
+"""Shares: of motion out of the plane, of a planar robot's layers, and of gravity that lies in the plane."""
 FRAME_COUNTS = (24, 48, 96, 192, 384)
 SMOOTH = 0.008
 """Share of the drawing by which a point may leave the straight line between two frames."""
 SCALE = 10
-"""Frames hold tenths of a point."""
+"""Frames hold tenths of a point of the drawing, or less."""
 AZIMUTH, ELEVATION = np.radians(38.0), np.radians(22.0)
 DRIVEN = PALETTE[1]
 PLATFORM = PALETTE[0]
@@ -38,6 +42,8 @@ class View:
     title: str
     right: FloatArray
     up: FloatArray
+    side: str = UPWARDS
+    """label of the axis that points up on paper"""
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Project."""
@@ -60,27 +66,51 @@ def mechanism_plot(run: Run, case: str, key: str, series: Series) -> Plot | None
     found = _skeleton(record, series) if record else None
     if record is None or found is None:
         return None
-    views = _views(np.array(record.up, dtype=np.float64), run.manifest.platform_axes)
+    views = views_of(record, found, run.manifest.platform_axes)
     kept = _frames(found.points)
-    layout = _layout(views, found.points)
+    whole = SIZE if len(views) > 1 else FLAT
+    layout = _layout(views, found.points, whole)
 
     def draw(figure: FigureBase) -> None:
         for number, (view, box, limits) in enumerate(layout):
-            axes = _panel(figure, view, box, limits, () if number else run.manifest.platform_axes)
+            axes = _panel(figure, view, box, limits, () if view.title else run.manifest.platform_axes)
             _draw_mechanism(axes, view, found, number)
 
-    number = len(record.joints)
+    number, seen = len(record.joints), "in three views" if len(views) > 1 else "in its plane"
     driven = ", ".join(name for name, joint in record.joints.items() if joint.actuated)
     return Plot(
         f"{key}-mechanism",
-        SIZE,
+        whole,
         draw,
-        f"The mechanism in case {case} at its first sample, in three views: {len(record.links)} moving bodies, "
+        f"The mechanism in case {case} at its first sample, {seen}: {len(record.links)} moving bodies, "
         f"{number} joints, driven by {driven}; a thin line is the path of the platform over the case.",
         "The mechanism, drawn from the reference's own positions at the first sample: bodies as lines, circles are "
         "hinges and ball joints (filled), squares slides, orange what is driven; blue the platform and its path",
         key,
-        _animation(found, kept, series["t"], layout),
+        _animation(found, kept, series["t"], layout, whole),
+    )
+
+
+def robot_sketch(run: Run, case: str, series: Series) -> Plot | None:
+    """Draw the robot as a reader meets it first, obliquely at the first sample; None where no points are stored."""
+    record = run.manifest.cases[case].drawing
+    found = _skeleton(record, series) if record else None
+    if record is None or found is None:
+        return None
+    views = views_of(record, found, run.manifest.platform_axes)[:1]
+    ((view, box, limits),) = _layout(views, found.points, SKETCH)
+
+    def draw(figure: FigureBase) -> None:
+        axes = _panel(figure, view, box, limits, () if view.title else run.manifest.platform_axes)
+        _draw_mechanism(axes, view, found, 0)
+
+    return Plot(
+        "figure-robot",
+        SKETCH,
+        draw,
+        f"The mechanism in case {case} at its first sample: {len(record.links)} moving bodies, {len(record.joints)} "
+        "joints; a thin line is the path of the platform.",
+        f"The robot in case {case}, drawn from the reference's own positions; orange is driven, blue the platform",
     )
 
 
@@ -117,6 +147,46 @@ def _owner(record: DrawingRecord) -> str:
             if any(pair[side] == record.platform for pair in pairs):
                 return body
     return ""
+
+
+def views_of(record: DrawingRecord, skeleton: Skeleton, names: tuple[str, ...]) -> tuple[View, ...]:
+    """Return the view of the plane in which a planar robot moves; else an oblique and two horizontal ones."""
+    up = np.array(record.up, dtype=np.float64)
+    normal = plane_of(record, skeleton.points)
+    return _views(up, names) if normal is None else (_plane_view(normal, up, names),)
+
+
+def plane_of(record: DrawingRecord, points: FloatArray) -> FloatArray | None:
+    """Return the normal of the plane in which all *points* ``(n, k, 3)`` move; None of a spatial robot.
+
+    A ball joint makes a robot spatial, whatever it does in this case.
+    """
+    if any(joint.kind == "ball" for joint in record.joints.values()):
+        return None
+    moved = (points - points[0]).reshape(-1, 3)
+    _, sizes, axes = np.linalg.svd(moved, full_matrices=False)
+    if len(sizes) < 3 or sizes[1] <= PLANAR * sizes[0]:
+        return None  # along a line: in many planes
+    normal: FloatArray = axes[2]
+    extent = float(np.ptp(points[0], axis=0).max())
+    flat = sizes[2] <= PLANAR * sizes[0] and np.ptp(points[0] @ normal) <= THICKEST * extent
+    return normal if flat else None
+
+
+def _plane_view(normal: FloatArray, up: FloatArray, names: tuple[str, ...]) -> View:
+    """Gravity points down where it lies in the plane; else the paper's axes lie as they are used to."""
+    axes = sorted(sorted(range(3), key=lambda k: abs(normal[k]))[:2])
+    across, along = (np.eye(3)[k] - normal[k] * normal for k in axes)
+    told = [f"{names[k] if k < len(names) else f'x{k + 1}'} [m]" for k in axes]
+    upright = up - (up @ normal) * normal
+    if np.linalg.norm(upright) > UPRIGHT:
+        upright /= np.linalg.norm(upright)
+        level, title = (across, told[0]) if abs(across @ upright) < abs(along @ upright) else (along, told[1])
+        level = level - (level @ upright) * upright
+        return View(title, level / np.linalg.norm(level), upright)
+    right = across / np.linalg.norm(across)
+    upwards = along - (along @ right) * right
+    return View(told[0], right, upwards / np.linalg.norm(upwards), told[1])
 
 
 def _views(up: FloatArray, names: tuple[str, ...]) -> tuple[View, ...]:
@@ -157,11 +227,12 @@ def _frames(points: FloatArray) -> np.ndarray:
 Layout = list[tuple[View, tuple[float, float, float, float], tuple[float, float, float, float]]]
 
 
-def _layout(views: tuple[View, ...], points: FloatArray) -> Layout:
+def _layout(views: tuple[View, ...], points: FloatArray, whole: tuple[float, float] = SIZE) -> Layout:
     """Give each view a box, fractions of the figure, and limits of equal scale that hold everything at all times."""
-    width, height = SIZE
-    left, gap, bottom, top = 0.05, 0.62, 0.45, 0.12
-    room = (width - 2 * gap - left - 0.1) / 3
+    width, height = whole
+    left, gap = 0.05 if not views[0].title else 0.6, 0.62
+    bottom, top = 0.45 if views[-1].title else 0.05, 0.12
+    room = (width - (len(views) - 1) * gap - left - 0.1) / len(views)
     layout: Layout = []
     for number, view in enumerate(views):
         flat = view(points).reshape(-1, 2)
@@ -189,10 +260,10 @@ def _panel(
     if not triad:
         axes.locator_params(nbins=5)
         axes.set_xlabel(view.title)
-        if size_of(figure)[0] < NARROW:  # beside the axis it would run into the neighbour
-            axes.set_title(UPWARDS)
+        if size_of(figure)[0] < NARROW and box[2] < 0.5:  # beside the axis it would run into the neighbour
+            axes.annotate(view.side, (0.03, 0.98), xycoords="axes fraction", va="top")
         else:
-            axes.set_ylabel(UPWARDS)
+            axes.set_ylabel(view.side)
         return axes
     axes.set_axis_off()
     length = 0.12 * (limits[1] - limits[0])
@@ -235,22 +306,37 @@ def _draw_mechanism(axes: Axes, view: View, skeleton: Skeleton, number: int) -> 
         )
 
 
-def _animation(skeleton: Skeleton, kept: np.ndarray, time: FloatArray, layout: Layout) -> str:
-    """Return times, lines, joints and positions in tenths of a point of the drawing, as JSON."""
-    to_points = np.array([SIZE[0], SIZE[1]]) * POINTS_PER_INCH
-    views = []
+def _animation(
+    skeleton: Skeleton, kept: np.ndarray, time: FloatArray, layout: Layout, whole: tuple[float, float]
+) -> str:
+    """Return times, lines, joints, positions in space and the views' projections onto the drawing, as JSON.
+
+    Positions are whole multiples of ``1 / scale``, in the order of time and as differences; each view has two rows
+    ``[ax, ay, az, b]``, which make a point of the drawing ``(a . p + b)``.
+    """
+    width, height = np.array(whole) * POINTS_PER_INCH
+    centre = skeleton.points[kept].reshape(-1, 3).mean(axis=0)
+    views, largest = [], 0.0
     for view, box, (x0, x1, y0, y1) in layout:
-        flat = view(skeleton.points[kept])
-        x = (box[0] + box[2] * (flat[..., 0] - x0) / (x1 - x0)) * to_points[0]
-        y = (1 - box[1] - box[3] * (flat[..., 1] - y0) / (y1 - y0)) * to_points[1]
-        tenths = np.rint(SCALE * np.stack([x, y], axis=-1)).astype(int).reshape(len(kept), -1)
-        first, steps = tenths[0], np.diff(tenths, axis=0)
-        views.append([first.tolist(), *steps.tolist()])  # differences: smaller numbers, a third of the bytes
+        across, down = box[2] * width / (x1 - x0), box[3] * height / (y1 - y0)
+        start = np.array([box[0] * width, (1 - box[1]) * height])
+        middle = view(centre) - [x0, y0]
+        views.append(
+            [
+                [*(across * view.right), start[0] + across * middle[0]],
+                [*(-down * view.up), start[1] - down * middle[1]],
+            ]
+        )
+        largest = max(largest, across, down)
+    scale = SCALE * largest
+    places = np.rint((skeleton.points[kept] - centre) * scale).astype(int).reshape(len(kept), -1)
     told = {
         "t": [float(f"{v:.6g}") for v in time[kept]],
-        "scale": SCALE,
+        "scale": float(f"{scale:.9g}"),
         "lines": {kind: [list(pair) for pair in pairs] for kind, pairs in skeleton.lines},
         "joints": {kind: list(members) for kind, members in skeleton.joints},
-        "views": views,
+        "views": [[[float(f"{v:.7g}") for v in row] for row in rows] for rows in views],
+        # differences: smaller numbers, a third of the bytes
+        "places": [places[0].tolist(), *np.diff(places, axis=0).tolist()],
     }
     return json.dumps(told, separators=(",", ":"))

@@ -9,7 +9,7 @@ from workbench.campaign.changed import ANOTHER, sentences
 from workbench.report.load import ErrorRow, Run
 from workbench.report.manifest import Manifest
 from workbench.report.tables import FAILURES, Cell, Table, columns
-from workbench.report.text import exact, pretty_unit
+from workbench.report.text import exact, torque_label
 
 PERCENT_FROM = 1e-6
 """Smaller errors are powers of ten."""
@@ -26,7 +26,7 @@ def paper_table(run: Run) -> Table:
     for (candidate, reference), found in groups.items():
         cells = [_worst([row for row in found if row.joint == joint]) for joint in joints]
         rows.append((Cell(candidate), Cell(reference), *cells))
-    titles = [f"{joint} [{pretty_unit(run.manifest.unit_of(joint))}]" for joint in joints]
+    titles = [torque_label(joint, run.manifest.unit_of(joint)) for joint in joints]
     computed = sum(record.samples is not None for record in run.manifest.cases.values())
     samples = sum(record.samples or 0 for record in run.manifest.cases.values())
     return Table(

@@ -37,8 +37,10 @@ FULL_WIDTH_FROM = 7.0
 """inches: figures designed wider than this take the whole width of the page"""
 COLUMN, TEXT = 229.0, 344.0
 """TeX points: a column of a two-column article, and the text of a one-column article."""
+POINTS = 72.27
+"""TeX's points in an inch."""
 LEAST_HEIGHT = 0.8
-"""Of the height on a page: panels side by side shrink, panels above each other need their room."""
+"""Of the height on a page: panels above each other need their room."""
 LONG = 36
 """Letters from which on a column of a table breaks its lines."""
 FONTS = {"page": "DejaVu Sans", "paper": "DejaVu Serif"}
@@ -83,7 +85,9 @@ def figure_pdf(plot: Plot, style: str = "page") -> bytes:
 def article_size(plot: Plot) -> tuple[float, float]:
     """Width and height in inches on which a figure needs no scaling: of a column, or of the text where it is wide."""
     width, height = plot.size
-    room = (TEXT if width > FULL_WIDTH_FROM else COLUMN) / 72.27  # TeX's points
+    if width > FULL_WIDTH_FROM:  # panels beside each other, which become narrow enough
+        return TEXT / POINTS, height
+    room = COLUMN / POINTS
     return room, height * max(room / width, LEAST_HEIGHT)
 
 
@@ -135,7 +139,9 @@ def _blocks(section: Section, style: str, parts: dict[str, str]) -> Iterator[Blo
     context = section.context
     if "sentence" in context:
         yield {"kind": "verdict", **_badge(context["status"]), "sentence": context["sentence"]}
-    if context.get("about"):
+    if context.get("compared"):
+        yield from _opening(context, style, parts)
+    elif context.get("about"):
         yield _text(context["about"])
     if context.get("attention"):
         yield _text("Needs attention (no failure of a formula; the verdict stands):")
@@ -154,13 +160,33 @@ def _blocks(section: Section, style: str, parts: dict[str, str]) -> Iterator[Blo
         yield _text(context["note"])
     views = context.get("views", ())
     cases = [view for view in views if isinstance(view, CaseView)]
-    if not cases:
+    if not cases and not context.get("compared"):
         yield from _figures(section, views, style, parts)
     yield from map(_table, context.get("tables", ()))
     if context.get("points"):
         yield {"kind": "points", "points": list(context["points"])}
     for view in cases:
         yield from _case(view, style, parts)
+
+
+def _opening(context: Mapping[str, Any], style: str, parts: dict[str, str]) -> Iterator[Block]:
+    """What stands on the first page, before the contents: what was compared, what to look at, the robot, all cases."""
+    still, sketch, picture = context["still"], context["sketch"], None
+    if still is not None:
+        picture = _figure(
+            "still.svg", f"The robot, rendered by MuJoCo at the first moment of case {still.case}", still.alt
+        )
+        parts["still.svg"] = _picture(still.still, still.still_file)
+    elif sketch is not None:
+        picture = _figure(f"{sketch.key}.svg", sketch.caption, sketch.alt)
+        parts[f"{sketch.key}.svg"] = _drawing(sketch, style)
+    found = [point.text for point in context["findings"]]
+    calm = "" if found or context.get("attention") else "Nothing needs attention."
+    texts = [text for text in (context["compared"], context["about"], calm) if text]
+    yield {"kind": "opening", "texts": texts, "points": found, "picture": picture, "head": True}
+    if context["glance"] is not None:
+        for block in _plots((context["glance"],), style, parts, {}):
+            yield block | {"head": True}
 
 
 def _figures(section: Section, views: Iterable[Any], style: str, parts: dict[str, str]) -> Iterator[Block]:
@@ -191,11 +217,6 @@ def _case(view: CaseView, style: str, parts: dict[str, str]) -> Iterator[Block]:
     yield from _plots(view.plots, style, parts, {})
     if view.film is not None and view.film.note:
         yield _text(f"No rendered picture: {view.film.note}.")
-    elif view.film is not None and view.film.still:
-        name = f"{view.anchor}-still.svg"
-        parts[name] = _picture(view.film.still, view.film.still_file)
-        caption = "The robot's model as MuJoCo renders it, at the first moment of this case"
-        yield {"kind": "plots", "plots": [_figure(name, caption, view.film.alt)], "wide": False}
     yield from map(_table, view.tables)
 
 

@@ -58,6 +58,11 @@ class Film:
         return f"data:image/webp;base64,{base64.b64encode(self.sheet).decode('ascii')}"
 
     @property
+    def still_address(self) -> str:
+        """The still picture as an address that loads nothing."""
+        return f"data:image/webp;base64,{base64.b64encode(self.still).decode('ascii')}"
+
+    @property
     def times(self) -> str:
         """Seconds of the frames."""
         return " ".join(f"{time:g}" for time in self.record.times) if self.record else ""

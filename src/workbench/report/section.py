@@ -8,6 +8,23 @@ from typing import Any
 
 from workbench.report.plot import Plot
 
+SHORT = {
+    "The papers' claims": "Claims",
+    "Worst errors first": "Worst errors",
+    "Is it good enough": "Good enough",
+    "What the actuators have to give": "Actuators",
+    "Can the reference be believed": "Reference",
+    "Figures of the papers, redrawn": "Figures",
+    "How to reproduce": "Reproduce",
+    "Limits and caveats": "Limits",
+    "How large the errors are": "Errors",
+    "What drives the error": "Drivers",
+    "Error over two numbers": "Maps",
+    "The worst designs": "Worst designs",
+    "What did not pass, and what was left out": "Not passed",
+}
+"""Titles of sections in the list of contents, which stays in sight and has one line."""
+
 
 @dataclass(frozen=True)
 class Section:
@@ -18,3 +35,10 @@ class Section:
     template: str
     context: Mapping[str, Any]
     plots: tuple[Plot, ...] = ()
+    is_open: bool = True
+    """whether the page shows it before it is asked for"""
+
+    @property
+    def short(self) -> str:
+        """The title in the list of contents."""
+        return SHORT.get(self.title, self.title)

@@ -16,6 +16,7 @@ from workbench.report.error_sections import claims_section, worst_section
 from workbench.report.good_section import good_section
 from workbench.report.load import Run, Series
 from workbench.report.manifest import FigureRecord, Manifest
+from workbench.report.mechanism import robot_sketch
 from workbench.report.pictures import film_of
 from workbench.report.plot import Plot
 from workbench.report.section import Section
@@ -49,9 +50,12 @@ def build_sections(run: Run) -> list[Section]:
     drawn: dict[int, Plot | str] = {}
     views = []
     film = film_of(run)
+    sketch: Plot | None = None
     for name, record in run.manifest.cases.items():
         series: Series | None = None if record.status in NOT_COMPUTED else run.series(name)
         views.append(case_view(run, name, anchors[name], series, film))
+        if sketch is None and series is not None:
+            sketch = robot_sketch(run, name, series)
         for index, figure in enumerate(figures):
             if figure.case == name and figure.kind != "error_over":
                 drawn[index] = (
@@ -63,7 +67,7 @@ def build_sections(run: Run) -> list[Section]:
         if figure.kind == "error_over":
             drawn[index] = error_over_plot(run, figure, keys[index])
     sections = [
-        verdict_section(run),
+        verdict_section(run, anchors, film, sketch),
         good_section(run, anchors),
         claims_section(run),
         worst_section(run, anchors),
@@ -167,7 +171,7 @@ def parameters_section(manifest: Manifest) -> Section:
         "Counted by the formula of the mechanism's source; it agrees when the mobility equals each case's.",
     )
     tables = [table for table in (table, counted) if table.rows]
-    return Section("parameters", "Parameters", "tables", {"tables": tables})
+    return Section("parameters", "Parameters", "tables", {"tables": tables}, is_open=False)
 
 
 def reproduce_section(manifest: Manifest) -> Section:
@@ -178,6 +182,7 @@ def reproduce_section(manifest: Manifest) -> Section:
         ("Model SHA-256", manifest.model.sha256),
         ("Mechanism", manifest.model.mechanism),
         *([("Engines", ", ".join(manifest.engines))] if manifest.engines else []),
+        ("Documents cited as docs/…", "workbench docs NAME prints them, without a checkout too"),
         *((f"Version of {name}", version) for name, version in manifest.versions.items()),
     ]
     table = Table(
@@ -190,7 +195,11 @@ def reproduce_section(manifest: Manifest) -> Section:
     )
     spec = json.dumps(manifest.spec, indent=1, ensure_ascii=False, default=str) if manifest.spec else ""
     return Section(
-        "reproduce", "How to reproduce", "reproduce", {"command": manifest.command, "tables": [table], "spec": spec}
+        "reproduce",
+        "How to reproduce",
+        "reproduce",
+        {"command": manifest.command, "tables": [table], "spec": spec},
+        is_open=False,
     )
 
 

@@ -41,12 +41,17 @@ def spent_plot(run: Run, case: str, key: str, series: Series) -> Plot | None:
             # what pushes and what pulls are stacked apart, each from zero
             edges = [np.cumsum([0.0 * time, *np.maximum(tau, 0.0)], axis=0)]
             edges += [np.cumsum([0.0 * time, *np.minimum(tau, 0.0)], axis=0)]
-            rows = corners(time, np.concatenate(edges), EDGE_OFF * float(np.abs(edges).max()))
+            off = EDGE_OFF * float(np.abs(edges).max())
             for side in edges:
+                # each edge is thinned once, so that the areas on its two sides leave no gap
+                seen = [corners(time, edge[None, :], off) for edge in side]
                 for index, part in enumerate(parts):
-                    axes.fill_between(
-                        time[rows], side[index, rows], side[index + 1, rows], color=PALETTE[index % 6], alpha=0.75,
-                        linewidth=0, label=part if side is edges[0] else None,
+                    low, high = seen[index], seen[index + 1]
+                    if not np.any(side[index] != side[index + 1]):
+                        low = high = np.array([0, len(time) - 1])  # nothing to see but its name in the legend
+                    axes.fill(
+                        time[[*low, *high[::-1]]], [*side[index, low], *side[index + 1, high[::-1]]],
+                        color=PALETTE[index % 6], alpha=0.75, linewidth=0, label=part if side is edges[0] else None,
                     )  # fmt: skip
             axes.plot(time, tau.sum(axis=0), color="black", linewidth=0.8)
             axes.set_ylabel(torque_label(joint, unit))

@@ -18,6 +18,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from workbench.report.shrink import Shapes, merge_lines, relative_path
 from workbench.report.style import THEME
 
 POINTS_PER_INCH = 72.0
@@ -30,17 +31,18 @@ _DECLARATIONS = re.compile(
     r"^.*?(?=<svg)|<metadata>.*?</metadata>\s*|<defs>\s*<style.*?</style>\s*</defs>\s*", re.DOTALL
 )
 _PATH = re.compile(r' d="([^"]*)"')
-_STEP = re.compile(r"([A-Zz])\s*(?:(-?[\d.]+(?:e-?\d+)?)[\s]+(-?[\d.]+(?:e-?\d+)?)((?:\s+-?[\d.]+)+)?)?")
 _STYLE = re.compile(r' style="([^"]*)"')
-_GEOMETRY = re.compile(r'(?<= )(?:d|x|y|transform)="[^"<>]*"')
+_GEOMETRY = re.compile(r'(?<= )d="[^"<>]*"')
+_PLACE = re.compile(r'(?<= )(?:x|y|transform)="[^"<>]*"')
+_NUMBER = re.compile(r"-?\d+\.\d+")
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _UPRIGHT = re.compile(r' transform="rotate\(-?0 [^"]*"')
 _FONT = re.compile(r"font-family: [^;\"]*")
 _IDENTIFIER = re.compile(r'(?<=<)(\w+)([^<>]*?) id="([^"<>]*)"')
 _REFERENCE = re.compile(r'(url\(#|href="#)([^")]+)')
-_GROUP = re.compile(r"<g(?: [^>]*)?>\n?|</g>\n?")
+_GROUP = re.compile(r"<g(?: [^>]*[^>/])?>\n?|</g>\n?")
 _SVG_TAG = re.compile(r"<svg[^>]*>")
-_PANELS = re.compile(r'data-panels="[^"]*"')
+_PANELS = re.compile(r"data-panels='[^']*'")
 _VIEW_BOX = re.compile(r'viewBox="([^"]*)"')
 
 
@@ -61,7 +63,8 @@ def svg_of(figure: Figure, key: str) -> str:
     svg = compact(buffer.getvalue(), key)
     if panels:
         told = escape_xml(json.dumps(panels, ensure_ascii=False, separators=(",", ":")))
-        svg = svg.replace("<svg ", f'<svg data-panels="{told}" ', 1)
+        told = told.replace("&quot;", '"').replace("'", "&#39;")  # in single quotes: many fewer bytes
+        svg = svg.replace("<svg ", f"<svg data-panels='{told}' ", 1)
     return svg
 
 
@@ -110,9 +113,12 @@ def _is_curve(line: Line2D) -> bool:
 def compact(svg: str, key: str) -> str:
     """Strip what matplotlib adds around the drawing, shorten coordinates and make identifiers unique to *key*."""
     svg = _DECLARATIONS.sub("", svg)
-    svg = _PATH.sub(lambda match: f' d="{_relative(match[1])}"', svg)
+    svg = _PATH.sub(lambda match: f' d="{relative_path(match[1])}"', svg)
     svg = _GEOMETRY.sub(
         lambda match: _LONG_NUMBER.sub(lambda number: f"{float(number[0]):.2f}", match[0].replace("\n", "")), svg
+    )
+    svg = _PLACE.sub(
+        lambda match: _NUMBER.sub(lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), match[0]), svg
     )
     svg = _FONT.sub("font-family: sans-serif", svg)
     svg = _UPRIGHT.sub("", svg)
@@ -128,33 +134,7 @@ def compact(svg: str, key: str) -> str:
 
     svg = _IDENTIFIER.sub(identifier, svg)
     svg = _REFERENCE.sub(lambda match: f"{match[1]}{short[match[2]]}", svg)
-    return _without_bare_groups(re.sub(r"\n\s*", "\n", svg))
-
-
-def _relative(path: str) -> str:
-    """Write a path in tenths of a point, with lines as steps from point to point: half of the bytes.
-
-    The curve that matplotlib draws may leave the data by `path.simplify_threshold`, four of these tenths; steps lead
-    from rounded place to rounded place, so that they do not add up to an error.
-    """
-    pieces: list[str] = []
-    x = y = 0
-    for kind, first, second, other in _STEP.findall(path):
-        if other or kind not in "ML":
-            return path  # curves, of markers: short anyway
-        to_x, to_y = round(10 * float(first)), round(10 * float(second))
-        if kind == "M":
-            pieces.append(f"M{_tenths(to_x)} {_tenths(to_y)}")
-        elif (to_x, to_y) != (x, y):
-            pieces.append(f"l{_tenths(to_x - x)} {_tenths(to_y - y)}")
-        x, y = to_x, to_y
-    return "".join(pieces) + ("z" if path.rstrip().endswith("z") else "")
-
-
-def _tenths(value: int) -> str:
-    whole, tenth = divmod(abs(value), 10)
-    sign = "-" if value < 0 else ""
-    return f"{sign}{whole or ''}.{tenth}" if tenth else f"{sign}{whole}"
+    return merge_lines(_without_bare_groups(re.sub(r"\n\s*", "\n", svg)))
 
 
 def _without_bare_groups(svg: str) -> str:
@@ -176,6 +156,7 @@ class StyleSheet:
     def __init__(self) -> None:
         self._names: dict[str, str] = {}
         self._identifiers = 0
+        self._shapes = Shapes()
 
     def shorten(self, svg: str) -> str:
         """Replace every ``style`` attribute by a class, and identifiers by numbers that no other drawing has."""
@@ -184,10 +165,15 @@ class StyleSheet:
             self._identifiers += 1
             for before, after in (('id="', '"'), ("url(#", ")"), ('href="#', '"')):
                 svg = svg.replace(f"{before}{name}{after}", f"{before}s{self._identifiers}{after}")
-        return _STYLE.sub(lambda match: f' class="{self._name(match[1])}"', svg)
+        return self._shapes.share(_STYLE.sub(lambda match: f' class="{self._name(match[1])}"', svg))
 
     def _name(self, style: str) -> str:
         return self._names.setdefault(style, f"p{len(self._names)}")
+
+    @property
+    def shapes(self) -> str:
+        """What several drawings refer to, as a drawing of its own."""
+        return self._shapes.drawn
 
     @property
     def rules(self) -> str:

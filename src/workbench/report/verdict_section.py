@@ -2,28 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from workbench.campaign.changed import sentences
 from workbench.report.attention import attention
 from workbench.report.concluded import LOOKS, conclusion_of
+from workbench.report.first_screen import compared, points
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
+from workbench.report.overview import overview_plot
+from workbench.report.pictures import Film
+from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.tables import Cell, Status, Table, columns
 
 
-def verdict_section(run: Run) -> Section:
-    """Say in one sentence whether every bound holds, and list the formulas that were tested."""
+def verdict_section(
+    run: Run, anchors: Mapping[str, str], film: Film | None = None, sketch: Plot | None = None
+) -> Section:
+    """Say what was compared and in one sentence whether every bound holds; show the robot and all cases at a glance.
+
+    *film* and *sketch* show the robot: rendered where there is a picture, else drawn from the reference's points.
+    """
     status, sentence = verdict(run)
     sentence = sentence[:1].upper() + sentence[1:]
-    contrasts = {row.candidate for row in run.rows if row.kind == "contrast"}
-    tested = sum(name not in contrasts for name in run.manifest.candidates)
     table = candidates_table(run.manifest)
-    cases = _cases(len(run.manifest.cases))
-    about = f"{model_text(run.manifest)}, {cases}, {tested} candidate{'s' if tested != 1 else ''}."
-    context = {"status": status, "sentence": sentence, "about": about, "tables": [table]}
+    context: dict[str, Any] = {"status": status, "sentence": sentence, "tables": [table], "compared": compared(run)}
+    context["about"] = f"{model_text(run.manifest)}."
+    context["findings"] = points(run, anchors)
+    context["still"] = film if film is not None and film.still else None
+    context["sketch"] = sketch if context["still"] is None else None
+    context["glance"] = overview_plot(run)
     context["attention"] = attention(run)
     context["diagnosis"] = {name: found for name, found in run.manifest.diagnosis.items() if found.findings}
-    return Section("verdict", "Verdict", "verdict", context)
+    plots = tuple(plot for plot in (context["sketch"], context["glance"]) if plot is not None)
+    return Section("verdict", "Verdict", "verdict", context, plots)
 
 
 def candidates_table(manifest: Manifest) -> Table:
@@ -66,7 +80,3 @@ def verdict(run: Run) -> tuple[Status, str]:
     """Return the look of the run's verdict and its sentence."""
     found = conclusion_of(run)
     return LOOKS[found.status], found.sentence
-
-
-def _cases(number: int) -> str:
-    return f"{number} case" if number == 1 else f"{number} cases"

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from workbench.campaign.actuators import limits_of
+from workbench.campaign.asked import check_asked
 from workbench.campaign.cases import base_robot, resolve_cases
 from workbench.campaign.compare import compute_case
 from workbench.campaign.evidence import Effort
-from workbench.campaign.good import check_asked
+from workbench.campaign.not_driven import NotDriven, refuse_none
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate, full_names, load_candidates, with_rows
 from workbench.sweep.evaluate import Context, evaluate, series_bytes
@@ -49,6 +50,8 @@ class Estimate:
     """joints whose actuators have limits to be held against; of a sweep none"""
     measured: tuple[str, ...] = ()
     """formulas without a bound, which a wanted accuracy is held against"""
+    left_out: tuple[str, ...] = ()
+    """of cases that cannot be driven and that a run would go on past, the line that each would end it with"""
 
 
 def estimate(
@@ -60,10 +63,12 @@ def estimate(
     jobs: int | None,
     candidates: Sequence[str | Path] = (),
     only: Sequence[str] = (),
+    keep_going: bool = False,
 ) -> Estimate:
     """Estimate a campaign; everything in it is resolved and checked as for a run, and nothing is written.
 
-    *only* names the cases that would be run, of a sweep too; none is all.
+    *only* names the cases that would be run, of a sweep too; none is all. With *keep_going* cases that cannot be driven
+    are told, and the others estimated.
 
     Raises
     ------
@@ -76,7 +81,7 @@ def estimate(
     if campaign.sweep is not None and only:
         campaign = pick_cases(campaign, file, model, settings, only, users)
     if campaign.sweep is None:
-        return _of_cases(campaign, file, model, settings, effort, users, only)
+        return _of_cases(campaign, file, model, settings, effort, users, only, keep_going)
     effort = Effort.of_many(effort.engines, campaign.sweep.budget)
     plan = plan_sweep(campaign, file, model, settings, users)
     common = common_key(campaign, file, plan.model, settings, effort, campaign.sweep.keep_series, users)
@@ -128,9 +133,13 @@ def _of_cases(
     effort: Effort,
     users: Sequence[UserCandidate],
     only: Sequence[str],
+    keep_going: bool,
 ) -> Estimate:
     check_asked(campaign, str(file))
-    cases = resolve_cases(campaign, file, model, tuple(only), settings, (), users)
+    missing: list[NotDriven] = []
+    left_out = missing.append if keep_going else None
+    cases = resolve_cases(campaign, file, model, tuple(only), settings, (), users, left_out)
+    refuse_none(cases, missing)
     samples = sum(len(case.motion.t) for case in cases)
     short = min(cases, key=lambda case: len(case.motion.t))
     begun = time.perf_counter()
@@ -139,4 +148,7 @@ def _of_cases(
     size = len(series_bytes(result)) * samples / len(short.motion.t)
     limits = limits_of(campaign, cases[0].robot, str(file))
     asked = tuple(f"{one.name} against {one.reference}" for one in campaign.candidate if one.bound is None)
-    return Estimate(len(cases), samples, seconds, 1, size, size, tried=1, limited=tuple(limits), measured=asked)
+    told = tuple(str(one.error) for one in missing)
+    return Estimate(
+        len(cases), samples, seconds, 1, size, size, tried=1, limited=tuple(limits), measured=asked, left_out=told
+    )

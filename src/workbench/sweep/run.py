@@ -13,12 +13,13 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.campaign import store
+from workbench.campaign.actuators import limits_of
 from workbench.campaign.changes import Variant, changes_of
 from workbench.campaign.conclusion import Conclusion
 from workbench.campaign.evidence import Effort
 from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
-from workbench.campaign.replacing import Request, asked_for, request_of
+from workbench.campaign.replacing import Request, asked_for, lost_evidence, request_of
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import full_names, load_candidates, with_rows
 from workbench.errors import OutputError, SpecError, WorkbenchError
@@ -163,7 +164,7 @@ def run_sweep(
     request = request_of(model, settings or {}, (), (), candidates)
     with locked(directory):
         try:
-            aside = _put_aside(directory, campaign, request, options)
+            aside = _put_aside(directory, campaign, request, options, effort)
         except OSError as error:
             raise _refused(directory, error, 0, plan.count) from error
         done, new = 0, not directory.exists()
@@ -210,7 +211,7 @@ def _refused(directory: Path, error: OSError, done: int, total: int) -> OutputEr
     return OutputError(f"{directory}: cannot be written: {error.strerror or error}{kept}", path=str(directory))
 
 
-def _put_aside(directory: Path, campaign: Campaign, request: Request, options: SweepOptions) -> Path:
+def _put_aside(directory: Path, campaign: Campaign, request: Request, options: SweepOptions, effort: Effort) -> Path:
     """Where a finished earlier run is kept until the one that takes its place is finished; it may be empty.
 
     Raises
@@ -228,6 +229,15 @@ def _put_aside(directory: Path, campaign: Campaign, request: Request, options: S
     other = state.holds_cases(directory) and (
         old.get("campaign") not in (campaign.name, "") or (before is not None and before != request)
     )
+    finished = files.read_json(directory / store.MANIFEST) or {}
+    less = lost_evidence(finished, effort)
+    if less and not other and not (options.replace or options.fresh):
+        raise OutputError(
+            f"{directory}: holds an earlier sweep {'; '.join(less)}; --replace puts this one in its place, --out names"
+            " another directory",
+            path=str(directory),
+        )
+    other = other or bool(less)
     if other and not (options.replace or options.fresh):
         raise OutputError(
             f"{directory}: holds cases of another sweep ({asked_for(old)}; here {asked_for({'request': request})});"
@@ -338,6 +348,7 @@ def _manifest(
             }
             for c in campaign.candidate
         },
+        "actuators": limits_of(campaign, plan.robot, str(file)),
         "claims": [],
         "figures": [],
         "cases": {},

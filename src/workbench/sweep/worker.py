@@ -15,6 +15,8 @@ import sys
 import threading
 from typing import Any, BinaryIO
 
+from workbench.no_exit import for_good
+
 READY = "ready"
 DONE = "done"
 RAISED = "raised"
@@ -72,6 +74,7 @@ def _feed(stream: BinaryIO, tasks: queue.SimpleQueue[Any]) -> None:
 
 def main() -> int:
     """Serve until the parent goes."""
+    for_good()
     source = os.fdopen(os.dup(0), "rb")
     sink = os.fdopen(os.dup(1), "wb")
     # what a candidate prints must not end up between the answers

@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from workbench.capabilities.robot import Robot
+from workbench.errors import OutputError
+from workbench.reading import read_json
 from workbench.staging import DirectoryKind
 from workbench.workspace.grid import Workspace
 
 FORMAT = 1
 CELLS = "workspace.parquet"
 FACTS = "workspace.json"
+OWN = {
+    "mechanism": "a robot",
+    "parameters": "parameters",
+    "axes": "axes",
+    "held": "coordinates held",
+    "joint_limits": "ranges of joints",
+    "spacing_m": "a grid",
+}
+"""What makes a workspace another one; the same one may be computed again and again over itself."""
 WORKSPACE = DirectoryKind(
     what="workspace",
     marker=FACTS,
@@ -53,6 +65,37 @@ def workspace_facts(workspace: Workspace, robot: Robot) -> dict[str, Any]:
         },
         "parameters": dict(robot.values),
     }
+
+
+def refuse_other(directory: Path, facts: Mapping[str, Any]) -> None:
+    """Refuse to put a workspace in the place of one of another robot, or that was computed otherwise.
+
+    Parameters
+    ----------
+    directory
+        Where it would go.
+    facts
+        As `workspace_facts`, or as much of it as is known.
+
+    Raises
+    ------
+    OutputError
+        What differs, and the way on.
+    """
+    try:
+        old = read_json(directory / FACTS)
+    except (OSError, ValueError):
+        return
+    if not isinstance(old, Mapping):
+        return
+    now = json.loads(json.dumps({key: facts[key] for key in OWN if key in facts}))
+    unlike = [OWN[key] for key, value in now.items() if key in old and old[key] != value]
+    if unlike:
+        raise OutputError(
+            f"{directory}: holds an earlier workspace with {', '.join(unlike)} unlike this one's; --replace puts"
+            " this one in its place, --out names another directory",
+            path=str(directory),
+        )
 
 
 def write_workspace(stage: Path, workspace: Workspace, robot: Robot) -> None:

@@ -14,7 +14,7 @@ from workbench.report.sweep.load import SweepRun
 from workbench.report.sweep.varied import label_of
 from workbench.report.sweep.verdict import number, status_of
 from workbench.report.tables import Cell, Table, columns
-from workbench.report.text import exact, percent, pretty_unit, scientific
+from workbench.report.text import exact, percent, scientific, torque_label
 
 WORST = {True: 10, False: 5}
 """Designs listed: of a modelling error, of a verification."""
@@ -80,7 +80,8 @@ def _worst_table(
     joints = run.manifest.joints
     keys = [label_of(key) for key in run.summary.keys]
     kept = any(run.series(index) for index in indices)
-    names = ["Case", *(["Series"] if kept else []), *joints, *keys]
+    headings = [torque_label(joint, run.manifest.unit_of(joint)) for joint in joints]
+    names = ["Case", *(["Series"] if kept else []), *headings, *keys]
     rows = []
     for index in indices:
         errors = run.errors[candidate, reference][index]
@@ -90,15 +91,14 @@ def _worst_table(
         cells += [Cell(write(float(error)), float(error), emphasis=bool(error == errors.max())) for error in errors]
         cells += [Cell(exact(float(value)), float(value)) for value in run.values[index]]
         rows.append(tuple(cells))
-    units = ", ".join(f"{joint} {pretty_unit(run.manifest.unit_of(joint))}" for joint in joints)
     bound = run.bounds.get((candidate, reference))
     judged = f" Each has to stay below {exact(bound)}." if bound is not None else ""
     return Table(
         f"worst-{place + 1}",
         f"The {len(rows)} designs with the largest error of {candidate} against the {reference} reference.",
-        columns(names, numeric=[*joints, *keys]),
+        columns(names, numeric=[*headings, *keys]),
         tuple(rows),
-        f"Under each joint its peak error, max|Δτ| / max|τ_ref| ({units}), the design's largest in bold.{judged} Then "
+        f"Under each joint its peak error, max|Δτ| / max|τ_ref|, the design's largest in bold.{judged} Then "
         "the numbers that make the design.",
     )
 

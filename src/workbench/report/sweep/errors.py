@@ -18,7 +18,7 @@ from workbench.report.sweep.load import SweepRun
 from workbench.report.sweep.summary import ANY_JOINT, ErrorRecord
 from workbench.report.sweep.verdict import number
 from workbench.report.tables import Cell, Table, columns
-from workbench.report.text import exact, percent, scientific, slug
+from workbench.report.text import exact, percent, scientific, slug, torque_label
 
 LIMITS = (0.01, 0.02, 0.05, 0.1)
 """Modelling errors that designs are counted below, beside those that the campaign names."""
@@ -134,7 +134,7 @@ def _table(run: SweepRun, place: int, candidate: str, reference: str, kind: str)
         if row is None or not row.cases:
             continue
         values = _values(run, candidate, reference, joint)
-        cells = [Cell(LARGEST if joint == ANY_JOINT else joint)]
+        cells = [Cell(LARGEST if joint == ANY_JOINT else torque_label(joint, run.manifest.unit_of(joint)))]
         for limit in limits:
             share = float(np.mean(values < limit))
             cells.append(Cell(percent(share), share))

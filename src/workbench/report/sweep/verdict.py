@@ -71,6 +71,12 @@ def verdict_section(run: SweepRun) -> Section:
         "about": about,
         "tables": [outcomes, candidates_table(run.manifest)],
         "attention": [],
+        # what the first screen of a campaign of cases shows besides
+        "compared": "",
+        "findings": [],
+        "still": None,
+        "sketch": None,
+        "glance": None,
         "diagnosis": {},  # of a formula that fails in a sweep, `workbench diagnose` tells more, on one of its cases
     }
     return Section("verdict", "Verdict", "verdict", context)

@@ -1,5 +1,5 @@
-/* What the page adds where scripts run: tables that sort and filter, and one time slider per case that moves a marker
-   through its plots and its drawing. Everything is readable without it; nothing is loaded and nothing is sent. */
+/* What the page adds where scripts run: tables that sort and filter, figures that open large, and one time slider per
+   case that moves a marker through its plots and its drawing. Everything is readable without it; nothing is loaded and nothing is sent. */
 "use strict";
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
@@ -21,6 +21,71 @@
     const size = Math.abs(value);
     return size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(1) : String(Number(value.toPrecision(3)));
   };
+
+  /* ---- what is folded ---- */
+  const reveal = (element) => {
+    for (let at = element; at; at = at.parentElement) if (at.tagName === "DETAILS") at.open = true;
+  };
+  const target = (address) => {
+    try { return document.getElementById(decodeURIComponent(address.slice(1))); } catch { return null; }
+  };
+  const follow = (address) => {
+    const element = address.length > 1 ? target(address) : null;
+    if (!element) return;
+    const own = element.querySelector(":scope > details.fold");
+    if (own) own.open = true;
+    reveal(element);
+    element.scrollIntoView();
+  };
+  document.addEventListener("click", (event) => {
+    const link = event.target.closest?.('a[href^="#"]');
+    if (link) setTimeout(() => follow(link.getAttribute("href")));
+  });
+  let shut = [];
+  window.addEventListener("beforeprint", () => {
+    shut = [...document.querySelectorAll("details:not(.extra):not([open])")];
+    for (const details of shut) details.open = true;
+  });
+  window.addEventListener("afterprint", () => { for (const details of shut) details.open = false; });
+  const contents = document.querySelector("nav.contents ol");
+  const folds = [...document.querySelectorAll("details.fold")];
+  if (contents && folds.length) {
+    const every = make("button", { type: "button", class: "every" }, "Open all");
+    every.addEventListener("click", () => {
+      const open = folds.some((fold) => !fold.open);
+      for (const fold of folds) fold.open = open;
+      every.textContent = open ? "Fold all" : "Open all";
+    });
+    contents.after(every);
+  }
+
+  /* ---- figures that open large ---- */
+  const large = make("dialog", { class: "large", "aria-label": "Figure" });
+  const close = make("button", { type: "button", class: "close" }, "Close");
+  let [moved, stand] = [null, null];
+  large.append(close);
+  document.body.append(large);
+  close.addEventListener("click", () => large.close());
+  large.addEventListener("click", (event) => { if (event.target === large) large.close(); });
+  large.addEventListener("close", () => {
+    stand?.replaceWith(moved);
+    moved?.querySelector(".enlarge")?.focus();
+    [moved, stand] = [null, null];
+  });
+  for (const figure of document.querySelectorAll("figure")) {
+    const told = figure.querySelector("figcaption")?.textContent.trim() ?? "";
+    const button = make("button", { type: "button", class: "enlarge", title: "Show large", "aria-label": `Show large: ${told}` }, "⤢");
+    button.addEventListener("click", () => {
+      if (moved) return;
+      // a place of the same height is kept, so that the page does not jump
+      stand = make("div", { style: `height: ${figure.offsetHeight}px` });
+      moved = figure;
+      figure.replaceWith(stand);
+      large.append(figure);
+      large.showModal();
+    });
+    figure.append(button);
+  }
 
   /* ---- tables ---- */
   const FILTER_FROM = 8;
@@ -159,13 +224,27 @@
   const parsePath = (d) => {
     const found = [];
     let [x, y] = [0, 0];
-    for (const match of d.matchAll(/([Ml])\s*(-?[\d.]+)\s+(-?[\d.]+)/g)) {
-      const [first, second] = [Number(match[2]), Number(match[3])];
-      [x, y] = match[1] === "M" ? [first, second] : [x + first, y + second];
-      found.push([match[1] === "M" ? "M" : "L", x, y]);
+    for (const [, kind, told] of d.matchAll(/([Ml])([^A-Za-z]*)/g)) {
+      const numbers = told.match(/-?(?:\d+\.?\d*|\.\d+)/g) ?? [];
+      for (let k = 0; k + 1 < numbers.length; k += 2) {
+        const [first, second] = [Number(numbers[k]), Number(numbers[k + 1])];
+        [x, y] = kind === "M" ? [first, second] : [x + first, y + second];
+        found.push([kind === "M" ? "M" : "L", x, y]);
+      }
     }
     return found;
   };
+
+  class Curve {
+    constructor(label, path) {
+      [this.label, this.path, this.read] = [label, path, null];
+    }
+
+    get points() { // read when they are first asked for: a page has hundreds of curves
+      this.read ??= parsePath(this.path.getAttribute("d"));
+      return this.read;
+    }
+  }
 
   class Panel {
     constructor(svg, told, number) {
@@ -180,10 +259,10 @@
       this.window = [this.start, this.stop];
       this.curves = told.curves.map((label, index) => {
         const path = svg.querySelector(`.wb-curve-${number}-${index} path`);
-        return path ? { label, path, points: parsePath(path.getAttribute("d")) } : null;
+        return path ? new Curve(label, path) : null;
       }).filter(Boolean);
       this.uses = [...this.group.querySelectorAll("use")]
-        .filter((use) => !use.closest('[class^="wb-times"]') && Number(use.getAttribute("x")) > this.left + 0.01)
+        .filter((use) => !use.closest('[class^="wb-times"]') && Number(use.getAttribute("x")) > this.left + 0.06)
         .map((use) => ({ use, x: Number(use.getAttribute("x"))}));
       this.moments = [...this.group.querySelectorAll(".wb-moment")];
       this.cursor = draw("line", { class: "cursor", y1: this.top, y2: this.bottom, visibility: "hidden" }, svg);
@@ -281,10 +360,15 @@
   class Mechanism {
     constructor(svg, told) {
       this.told = told;
-      this.views = told.views.map((rows) => {
-        const sum = rows[0].map(() => 0);
-        return rows.map((row) => row.map((step, k) => (sum[k] += step) / told.scale));
-      });
+      const sum = told.places[0].map(() => 0);
+      const places = told.places.map((row) => row.map((step, k) => (sum[k] += step) / told.scale));
+      this.views = told.views.map((rows) => places.map((place) => {
+        const flat = [];
+        for (let k = 0; k < place.length; k += 3) {
+          for (const [a, b, c, d] of rows) flat.push(a * place[k] + b * place[k + 1] + c * place[k + 2] + d);
+        }
+        return flat;
+      }));
       this.lines = told.views.map((_, view) => Object.entries(told.lines).map(
         ([kind, pairs]) => [svg.querySelector(`.wb-line-${view}-${kind} path`), pairs]));
       this.joints = told.views.map((_, view) => Object.entries(told.joints).map(
@@ -396,8 +480,7 @@
       button("−", "Zoom out", () => this.zoom(2));
       button("⟲", "Show the whole time", () => this.zoom(Infinity));
       this.slider.addEventListener("input", () => this.set(Number(this.slider.value)));
-      const place = article.querySelector("h4");
-      article.insertBefore(bar, place);
+      article.querySelector("h4").before(bar);
       this.tell();
     }
 
@@ -449,4 +532,5 @@
   }
 
   for (const article of document.querySelectorAll("article[data-times]")) new Case(article);
+  follow(location.hash);
 })();
