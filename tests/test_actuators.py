@@ -226,3 +226,16 @@ def test_the_campaign_goes_over_the_robot_file_joint_by_joint(workbench: Workben
     done = workbench.run(own.replace("[[case]]", limits.replace("q1", "q7") + "\n[[case]]", 1), "--dry-run")
     assert done.code == 2
     assert 'no actuated joint "q7"' in done.err
+
+
+@pytest.mark.parametrize("limits", ["", "[actuators.q1]\npeak = 100.0\n"])
+def test_a_sweep_says_that_it_holds_nothing_against_limits(workbench: Workbench, limits: str) -> None:
+    robot_with(workbench.directory, limits)
+    sweep = (FIVEBAR / "fivebar.toml").read_text().partition("[[case]]")
+    case = "\n[[case]]".join(["", sweep[2].partition("[[case]]")[0].replace("samples = 101", "samples = 7")])
+    vary = '\n[sweep]\nmethod = "grid"\n[[sweep.vary]]\nkey = "speed"\nvalues = [0.5, 1.0]\n'
+    done = workbench.run(sweep[0] + case + vary, "--jobs", "1", "--out", "s")
+    assert done.code in (0, 4), done.err
+    assert ("holds no design against the limits" in " ".join(done.out.split())) == bool(limits)
+    manifest = json.loads(Path("s/manifest.json").read_text())
+    assert list(manifest["actuators"]) == (["q1"] if limits else [])

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -17,6 +18,7 @@ from workbench.report import drawing
 from workbench.report.build import build_report
 from workbench.report.drawing import can_fork, draw
 from workbench.report.plot import Plot
+from workbench.report.svg import compact
 
 two = pytest.mark.skipif(not can_fork(), reason="one core, or no Linux")
 
@@ -67,6 +69,7 @@ def test_what_the_second_has_drawn_the_first_does_not_draw(tmp_path: Path) -> No
     assert [plot.svg for plot in made] == [plot.svg for plot in alone]
     assert counts[0] == (0, 20)
     assert counts == sorted(counts)
+    assert counts[-1] == (20, 20)
 
 
 def ends(*_: Any) -> None:
@@ -104,3 +107,10 @@ def test_a_report_loads_no_engine(module: str) -> None:
     code = f"import sys, {module}; print(*[m for m in ('mujoco', 'numba', 'scipy', 'pandas') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
     assert done.stdout.split() == []
+
+
+def test_an_empty_group_is_none_that_is_opened() -> None:
+    inner = '<g clip-path="url(#a)"/>\n<g style="x: y">\n<path d="M 0 0"/>\n</g>'
+    root = ElementTree.fromstring(compact(f'<svg viewBox="0 0 1 1">\n<g>\n{inner}\n</g>\n</svg>\n', "key"))
+    groups = [child.attrib for child in root.iter() if child.tag == "g"]
+    assert groups == [{"clip-path": "url(#key-0)"}, {"style": "x: y"}]

@@ -293,3 +293,16 @@ def test_check_reports_open_loops_and_the_engines_warnings(tmp_path: Path) -> No
     assert any('site "parallelogram_bar_2_tip" pos is 5;' in line for line in found.broken)
     path.write_text(ASYM.read_text().replace('timestep="0.0005"', 'timestep="0.5"'))
     assert any("bad" in line or "unstable" in line for line in check_model(path).warnings)
+
+
+def test_check_counts_a_motor_for_each_freedom(tmp_path: Path) -> None:
+    path = tmp_path / "few.xml"
+    text = ASYM.read_text().replace('<text name="mechanism" data="asym_2rss_ppap"/>', "")
+    fewer, count = re.subn(r'<motor [^>]*joint="q3"[^>]*/>', "", text)
+    assert count == 1
+    path.write_text(fewer)
+    found = check_model(path, ranges=False)
+    assert found.exit_code == 1
+    assert any("few.xml: mobility 3, but 2 actuators; each freedom needs one" in line for line in found.broken)
+    path.write_text(text)
+    assert check_model(path, ranges=False).exit_code == 0

@@ -122,8 +122,10 @@ def test_a_motion_that_needs_no_following_is_closed_as_before() -> None:
     q, qd, qdd = sine_sum(np.random.default_rng(5), t, 0.7)
     reference = wb.MujocoReference(MODEL)
     scattered, ordered = reference.inverse_dynamics(q, qd, qdd), reference.inverse_dynamics(q, qd, qdd, along=t)
-    for name in ("tau", "qpos", "x"):
-        np.testing.assert_array_equal(getattr(scattered, name), getattr(ordered, name))
+    # by other ways to the same poses, to rounding
+    for name in ("tau", "x", "xd", "xdd"):
+        one, other = getattr(scattered, name), getattr(ordered, name)
+        assert np.abs(one - other).max() <= 1e-12 * np.abs(other).max(), name
 
 
 def test_jumps_between_neighbours_are_refused_with_time_and_joint(

@@ -299,3 +299,25 @@ def test_a_rod_between_two_ball_joints_does_not_spin() -> None:
     assert across > 1.0
     # nor does it begin to: the spin's own row is among those whose second derivative is left open by this
     assert res.acceleration_residual.max() < 1e-10
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rates_that_overflow_into_no_number_are_refused(sign: float) -> None:
+    """Infinite less infinite is no number, over which a maximum passes: the residual would be zero."""
+    reference = wb.MujocoReference(MODEL.with_name("planar_4rprp.xml"))
+    rates = np.full((1, 3), sign * 1e308)
+    with pytest.raises(MotionError, match="singular pose"):
+        reference.inverse_dynamics(reference.home[None, :], rates, np.zeros((1, 3)))
+    assert np.isfinite(reference.inverse_dynamics(reference.home[None, :], rates / 1e306, np.zeros((1, 3))).tau).all()
+
+
+@pytest.mark.parametrize("model", ["planar_4rprp.xml", "asym_2rss_ppap.xml"])
+def test_squares_of_rates_that_overflow_are_refused(model: str) -> None:
+    reference = wb.MujocoReference(MODEL.with_name(model))
+    home, still = reference.home[None, :], np.zeros((1, 3))
+    with pytest.raises(MotionError, match=r"^sample 0: rates so large that torques overflow "):
+        reference.inverse_dynamics(home, still + 1e200, still)
+    x = reference.inverse_dynamics(home, still, still).x
+    with pytest.raises(MotionError, match=r"^sample 0: rates so large that accelerations overflow "):
+        reference.joint_motion(x, still + 1e200, still, ("x", "y", "z"))
+    assert np.isfinite(reference.inverse_dynamics(home, still + 1e100, still).tau).all()

@@ -11,7 +11,7 @@ import pytest
 import workbench as wb
 from robots import FourBar, write_model
 from workbench.errors import MotionError
-from workbench.reference import continuation, pinocchio_loops, sides
+from workbench.reference import along, closure, continuation, pinocchio_loops, sides
 from workbench.reference.pinocchio_reference import PinocchioReference
 
 ENGINES = [
@@ -199,7 +199,8 @@ def test_rows_that_turn_over_where_the_mechanism_does_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spoiled: str
 ) -> None:
     """A four-bar whose plane is turned about its ground: the rows chosen at home hold nothing a quarter turn on."""
-    if spoiled:
+    if spoiled:  # without machine code of which nothing can be replaced
+        monkeypatch.setattr(closure, "is_covered", lambda _: False)
         monkeypatch.setattr(continuation, "same_side", lambda *arrays: arrays[-1].fill(spoiled == "always"))
     wrong = refused = 0
     model = FourBar()
@@ -229,3 +230,46 @@ def test_a_motion_through_a_near_meeting_stays_on_its_branch(tmp_path: Path) -> 
     assert np.abs(scattered.x[:, [0, 2]] - model.poses(q)[:, 3, :2]).max() < CLOSE
     moved = found.inverse_dynamics(q[:, None], still, still, near=scattered.qpos[np.r_[0, 0:39]])
     assert np.abs(moved.qpos - scattered.qpos).max() < CLOSE
+
+
+@pytest.mark.parametrize("guard", ["", "LONGEST_STEP"])
+def test_a_long_step_between_neighbours_is_followed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, guard: str
+) -> None:
+    """By lengths alone, without sides: the tangent leads to the other branch, the way itself does not."""
+    monkeypatch.setattr(continuation, "side_table", lambda *_: sides.NO_SIDES)
+    if guard:
+        monkeypatch.setattr(along, guard, np.inf)
+    q = np.array([[np.pi - 0.15], [np.pi + 0.15]])
+    found = {}
+    for branch in (1, -1):
+        model = FourBar(branch)
+        model.coupler, model.rocker = 0.2001, 0.2
+        closer = wb.MujocoReference(write_model(tmp_path, model.bodies(), LOOP, home=model.home()))._closer
+        found[branch] = closer, closer.follow(q)
+    closer, same = found[1]
+    jumped = same.at(np.arange(2))
+    jumped.put(np.array([1]), found[-1][1], np.array([1]))
+    jumped.qpos[1] -= 2 * np.pi * np.round((jumped.qpos[1] - same.qpos[1]) / (2 * np.pi))  # hinges may have gone round
+    assert np.abs(jumped.qpos[1] - same.qpos[1]).max() > 0.05
+    assert closer._linked(same, q).tolist() == [True]
+    assert closer._linked(jumped, q).tolist() == [bool(guard)]
+
+
+@pytest.mark.parametrize("spoiled", [False, True])
+def test_neighbours_on_two_sides_are_no_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spoiled: bool) -> None:
+    """A short step whose tangent leads to the other branch: near, and yet beyond a singular pose."""
+    q, found = np.array([[np.pi - 0.02], [np.pi + 0.02]]), {}
+    for branch in (1, -1):
+        model = FourBar(branch)
+        model.coupler, model.rocker = 0.2 + 1e-8, 0.2
+        closer = wb.MujocoReference(write_model(tmp_path, model.bodies(), LOOP, home=model.home()))._closer
+        found[branch] = closer, closer.follow(q)
+    closer, same = found[1]
+    jumped = same.at(np.arange(2))
+    jumped.put(np.array([1]), found[-1][1], np.array([1]))
+    jumped.qpos[1] -= 2 * np.pi * np.round((jumped.qpos[1] - same.qpos[1]) / (2 * np.pi))
+    if spoiled:
+        monkeypatch.setattr(type(closer), "_on_side", lambda self, here, rows, *_: np.ones(len(rows), dtype=np.bool_))
+    assert closer._linked(jumped, q).tolist() == [spoiled]
+    assert spoiled or closer._linked(same, q).tolist() == [True]

@@ -47,7 +47,8 @@ KERNEL_FILES = (
     ),
     *(f"robots/{name}.py" for name in ("blocks", "sine_cosine")),
     *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "kinds", "tables", "frames")),
-    *(f"reference/{name}.py" for name in ("task_rows", "platform_kernels", "sides")),
+    *(f"reference/{name}.py" for name in ("kinematics", "closing", "sides")),
+    *(f"reference/{name}.py" for name in ("task_rows", "platform_kernels")),
 )
 """What machine code is made of. A kernel calls into other files, and its cache must not outlive a change in those."""
 
@@ -60,6 +61,14 @@ def compiled(function: Callable[..., Any]) -> Any:
 def inlined(function: Callable[..., Any]) -> Any:
     """As `compiled`, for a part of a kernel: it becomes one loop body with its caller, which can then be vectorised."""
     return _cached(function, {"forceinline": True})
+
+
+def merged(function: Callable[..., Any]) -> Any:
+    """A part of a kernel that is written into its caller before that is compiled, and never compiled alone.
+
+    What takes many arrays is costly to call for the compiler: handing sixty over takes seconds to compile.
+    """
+    return njit(inline="always", **OPTIONS)(function)
 
 
 def _cached(function: Callable[..., Any], more: dict[str, Any]) -> Any:

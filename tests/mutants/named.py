@@ -26,6 +26,7 @@ class Named:
 COMPARE, VERDICT, METRICS = "campaign/compare.py", "campaign/verdict.py", "metrics.py"
 EVIDENCE, CANDIDATE = "campaign/evidence.py", "campaign/candidate_spec.py"
 CONTINUATION, ALONG, CLOSURE = "reference/continuation.py", "reference/along.py", "reference/closure.py"
+SIDES = "reference/sides.py"
 PINOCCHIO, KERNELS, ROWS = "reference/pinocchio_loops.py", "reference/kernels.py", "reference/rows.py"
 PLATFORM, REDUNDANT, REPLAY = "reference/platform_kernels.py", "reference/redundant.py", "reference/replay.py"
 REFERENCE, LOAD, VALUES = "reference/mujoco_reference.py", "robots/load.py", "robots/values.py"
@@ -48,6 +49,12 @@ NAMED: dict[str, Named] = {
     "length ignored": Named(CONTINUATION, "& small & (moved <= LONGEST_STEP)", "& small"),
     "correction ignored along": Named(ALONG, "linked = near & (moved <= LONGEST_STEP)", "linked = moved <= LONGEST_STEP"),
     "length ignored along": Named(ALONG, "linked = near & (moved <= LONGEST_STEP)", "linked = near"),
+    "sides not looked at": Named(CONTINUATION, "            accepted &= self._on_side(here, active, closed, accepted)\n", ""),
+    "sides not looked at along": Named(ALONG, "        linked &= self._on_side(found, rows, found.at(slice(1, None)), linked)\n", ""),
+    "sides not looked at, second engine": Named(PINOCCHIO, "if small and self._same_side(jacobian, after) else None", "if small else None"),
+    "rows that turn over are a jump": Named(SIDES, "same[s] &= volume >= 0.0 and not negative", "same[s] = False"),
+    "rows that turn over are no jump": Named(SIDES, "same[s] &= volume >= 0.0 and not negative", "same[s] = True"),
+    "sign of a pivot dropped": Named(SIDES, "negative ^= a[k, k] < 0.0", "negative ^= False"),
     "CORRECTION x 100, second engine": Named(PINOCCHIO, "CORRECTION = 0.1", "CORRECTION = 10.0"),
     "LONGEST_STEP x 100, second engine": Named(PINOCCHIO, "LONGEST_STEP = 0.2", "LONGEST_STEP = 20.0"),
     # checks of a model
@@ -57,6 +64,7 @@ NAMED: dict[str, Named] = {
     "places that disagree not refused": Named(LOAD, "    elif values is not None and elements is not None:", "    elif False:"),
     "rank of a pose not tested": Named(REFERENCE, "bad = (rank < len(structure.passive)) | ~(", "bad = ~("),
     "speed of a pose not tested": Named(REFERENCE, "bad = (rank < len(structure.passive)) | ~(residual <= self._closer.tolerance.velocity * speed)", "bad = rank < len(structure.passive)"),
+    "NaN in rates not seen": Named(KERNELS, "worst = math.inf if math.isnan(value) else max(worst, abs(value))", "worst = max(worst, abs(value))"),
     "NaN speed passes": Named(REFERENCE, "| ~(residual <= self._closer.tolerance.velocity * speed)", "| (residual > self._closer.tolerance.velocity * speed)"),
     "rank at home not tested, second engine": Named(PINOCCHIO, "if rank < len(self.passive):", "if False:"),
     "open loops not checked": Named(CHECK, "if not self.residual <= self.closer.tolerance.residual:", "if False:"),
@@ -106,13 +114,14 @@ NAMED: dict[str, Named] = {
 }  # fmt: skip
 
 EQUIVALENT: dict[str, str] = {
+    "NaN speed passes": "the kernel makes a row that is no number an infinite residual, and so the residual is never NaN",
     "open loops not checked": "a model whose loops stay open is refused before, when they are closed at home; the check"
     " only says so once more",
     "length ignored": "steps are cut to 1 - 1e-9 of the longest before they are taken, so none is longer; the comparison"
     " only says so once more",
     "NaN in free closure not seen": "numbers of a model are finite and at most 1e10 when it is loaded, and steps are at most"
     " 0.2 long, so no residual of a free closure is NaN; a second line of defence",
-    "NaN of the platform's side not seen": "configurations that come here are closed, so their rows are finite, and rates"
-    " are finite by the checks of arguments; a second line of defence",
+    "NaN of the platform's side not seen": "rates that overflow into no number give accelerations that are none, and those"
+    " are refused, too; a second line of defence",
 }
 """Named faults that no input can show, with the reason."""

@@ -133,6 +133,13 @@ def margins_of_facts(manifest: Mapping[str, Any]) -> list[Margin]:
     )
 
 
+IN_SWEEPS = (
+    "A sweep holds no design against the limits of actuators that this robot has: workbench run CAMPAIGN --only CASE"
+    " does it for one."
+)
+"""What a sweep says of a robot with limits."""
+
+
 def worst_of(found: Iterable[Margin]) -> list[Margin]:
     """The tightest case of each joint and figure, in the order in which they first come."""
     tightest: dict[tuple[str, str], Margin] = {}

@@ -16,6 +16,7 @@ from rich.text import Text
 
 from workbench import processes
 from workbench.campaign.evidence import Effort, check_engines
+from workbench.campaign.margins import IN_SWEEPS
 from workbench.campaign.spec import Campaign
 from workbench.campaign.verdict import WITHOUT_BOUND
 from workbench.console import err, out, print_changes, print_conclusion
@@ -185,6 +186,8 @@ def print_sweep(outcome: SweepOutcome) -> None:
             numbers = (row["quantiles"]["0.5"], row["quantiles"]["0.95"], row["max"])
             table.add_row(row["candidate"], row["reference"], *map(show, numbers), row["worst_case"])
     out.print(table)
+    if outcome.manifest["actuators"]:
+        out.print(Text(IN_SWEEPS, style="yellow"))
     drivers = summary["drivers"][:SHOWN_DRIVERS]
     if drivers:
         listed = ", ".join(f"{d['key']} {d['rank_correlation']:+.2f}" for d in drivers)

@@ -41,6 +41,9 @@ BROKEN = 10
 MOST_ACCIDENTS = 6
 """Sums that are right for this robot's numbers and no others, after which no more are looked at thoroughly."""
 
+NEAREST, OTHERS = slice(4), slice(4, None)
+"""Lines that terms are put into first, those that move least beyond what is wrong; and all others."""
+
 WORSE_FIRST = 8
 """Sources that got no better that are taken further before terms are put in, where most is wrong."""
 
@@ -118,16 +121,17 @@ class _Search:
 
     def _followed(self, root: Node) -> Node:
         """The best source that is found in time."""
-        best, better, worse, filled = root, [root], list[Node](), list[Node]()
+        best, better, worse, near, far = root, [root], list[Node](), list[Node](), list[Node]()
         seen, left = {root.text}, 0
         while (better or worse) and not best.complete and time.monotonic() < self._deadline:
             # the best source first; one that led nowhere gives way to the next best, at last to the least wrong
             climbing = bool(better)
             # where most is wrong two mistakes in kinematics hide each other; where little is, a term may be missing
             hidden = 2 * best.look.base.sum() < best.look.base.size and len(worse) > max(0, left - WORSE_FIRST)
-            if not climbing and filled and not hidden:
-                node, climbing = filled.pop(), True
-                found = [n for n in self._inserted(node) if _key(n) > _key(best)]
+            if not climbing and (near or (far and not hidden)):
+                node, climbing, lines = (near.pop(), True, NEAREST) if near else (far.pop(0), True, OTHERS)
+                far += [node] if lines == NEAREST else []
+                found = [n for n in self._inserted(node, lines) if _key(n) > _key(best)]
             else:
                 node = better.pop(0) if climbing else worse.pop(0)
                 if node.whole is None:
@@ -136,7 +140,7 @@ class _Search:
                 if not found:  # tens of thousands of sources that led nowhere are not kept
                     self._looked[node.text], self._breaks[node.text] = [], {}
                 if node is root or (climbing and node is best):
-                    filled.append(node)
+                    near.append(node)
             if found and _rank(found[0]) > _rank(best):
                 best = found[0]
             if len(node.chain) + 1 >= STEPS:
@@ -175,10 +179,10 @@ class _Search:
         self._fill([n for n in looked if thorough or n.look.key[0] > node.look.key[0]][:FULL])
         return sorted((n for n in looked if n.whole is not None), key=_rank, reverse=True)
 
-    def _inserted(self, node: Node) -> list[Node]:
+    def _inserted(self, node: Node, lines: slice) -> list[Node]:
         """The same of terms and factors put into the statements whose edits move what is wrong."""
         looked: list[Node] = []
-        for line in self._suspects(node):
+        for line in self._suspects(node)[lines]:
             stage = self._look(node, inserts_of(node.text, line))
             looked += stage
             right = [n for n in stage if n.look.base.all()]
@@ -192,13 +196,15 @@ class _Search:
         return sorted((n for n in looked if n.whole is not None), key=_rank, reverse=True)
 
     def _suspects(self, node: Node) -> list[int]:
-        """Lines whose edits together move all that is wrong, those that move least of what is right first."""
-        wrong, moves = ~node.look.base, dict[int, np.ndarray]()
+        """Lines whose edits together move all that is wrong, those first of which one moves just that."""
+        wrong, moves, nearest = ~node.look.base, dict[int, np.ndarray](), dict[int, int]()
         for looked in self._looked[node.text]:
             moved = ~(np.abs(looked.look.found - node.look.found).max(axis=1) <= NOTHING * self._paper.floors)
-            moves[looked.edit.line] = moves.get(looked.edit.line, False) | moved
+            line = looked.edit.line
+            moves[line] = moves.get(line, False) | moved
+            nearest[line] = min(nearest.get(line, moved.size), int((moved != wrong).sum()))
         lines = [line for line, moved in moves.items() if not (wrong & ~moved).any()]
-        return sorted(lines, key=lambda line: (int((moves[line] & ~wrong).sum()), line))
+        return sorted(lines, key=lambda line: (nearest[line], line))
 
     def _telling(self, node: Node, nodes: list[Node]) -> list[Node]:
         """Those that are right in the exam, too, that the source before is most wrong in."""

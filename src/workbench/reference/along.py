@@ -2,10 +2,14 @@
 
 A straight line from the home pose to a sample need not pass where the motion passes: around a cusp of the singular
 curve both ends are the same and the assemblies are not. So the samples of a motion are closed in order. In effect; for
-speed all are first closed as scattered samples are, in blocks, and the links between neighbours are looked at: where
-the tangent at one sample leads to the next by the measure that accepts every step of a continuation, the two are what
-following the motion would give. Only where a link is missing the motion is followed sample by sample, until it meets
-what stands already. Nothing of this depends on blocks or threads.
+speed chunks of a motion are followed side by side, each from a sample that a straight line from home reaches, and where
+two chunks meet it is looked at whether the one leads to the other; where it does not, the second is followed again.
+Nothing of this depends on threads.
+
+Where the package's own kinematics do not cover a model, all samples are first closed as scattered samples are, in
+blocks, and the links between neighbours are looked at: where the tangent at one sample leads to the next by the measure
+that accepts every step of a continuation, the two are what following the motion would give. Only where a link is
+missing the motion is followed sample by sample, until it meets what stands already.
 """
 
 from __future__ import annotations
@@ -14,10 +18,14 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError
+from workbench.reference.closing import CHAIN, Mechanism, advance, bench
 from workbench.reference.continuation import CORRECTION, LONGEST_STEP, NEGLIGIBLE, SMALLEST_STEP, Assembly, Continuation
 from workbench.reference.engine import Evaluator
 from workbench.reference.kinds import SCALAR
 from workbench.reference.structure import Structure
+
+CHUNK = 576
+"""Samples of a motion that are followed one after the other; chunks are shared by threads."""
 
 SAME = 1e-6
 """rad or m: configurations nearer than this are one; at a condition of 1e6 closures differ by 1e-7, and assemblies by
@@ -34,6 +42,8 @@ STILL = 1e-6
 class OrderedClosure(Continuation):
     """Adds to a continuation from home the closure along a motion, and from given configurations."""
 
+    mechanism: Mechanism | None = None
+    """tables of the package's own kinematics; None: MuJoCo evaluates every step"""
     _kept: tuple[FloatArray, Assembly] | None = None
     """what was scattered last: a motion's samples are asked for in order and one by one"""
 
@@ -59,6 +69,8 @@ class OrderedClosure(Continuation):
         MotionError
             Naming the first sample that cannot be reached from its predecessor (the first of all: from home).
         """
+        if self.mechanism is not None:
+            return self._followed(self.mechanism, q)
         try:
             found = self.close(q)
         except MotionError:
@@ -83,6 +95,42 @@ class OrderedClosure(Continuation):
                     break
                 found.put(one, step, one)
                 here += 1
+        return found
+
+    def _followed(self, mechanism: Mechanism, q: FloatArray) -> Assembly:
+        """Follow the motion in machine code, in chunks that begin at samples reached from home.
+
+        Where such a sample is not what the chunk before leads to, its chunk is followed again from there.
+        """
+        n, rules = len(q), self.rules()
+        q = np.array(q)
+        found, firsts = self._nothing(n, q.shape[1]), np.arange(0, n, CHUNK)
+        home, row = np.tile(self.start, (len(firsts), 1)), np.zeros(len(firsts), dtype=np.int64)
+        self._reach(q, firsts[:1], self._home, home[:1], row[:1], found)
+        known = np.ones(len(firsts), dtype=np.bool_)
+        known[1:] = self._reach(q, firsts[1:], self._home, home[1:], row[1:], found, SMALLEST_STEP)
+        ends, unused = np.zeros(len(firsts), dtype=np.int64), np.zeros(0)
+
+        def chunk(_: Evaluator | None, rows: slice) -> None:
+            if known[rows.start // CHUNK]:
+                ends[rows.start // CHUNK] = advance(
+                    mechanism, rules, bench(mechanism), CHAIN, q, q, rows.start + 1, rows.stop, *found.arrays, unused
+                )
+
+        self.engine.in_blocks(chunk, n, CHUNK)
+        step = self._nothing(n if len(firsts) > 1 else 0, q.shape[1])
+        for place, first in enumerate(firsts.tolist()):
+            if place:
+                one, before = np.array([first]), np.array([first - 1])
+                self._reach(q, one, found, q[before], before, step)
+                if not (known[place] and self._apart(step.qpos[one], found.qpos[one])[0] <= SAME):
+                    found.put(one, step.at(one))
+                    known[place] = True
+                    chunk(None, slice(first, min(first + CHUNK, n)))
+            blocked = int(ends[place])
+            if blocked < min(first + CHUNK, n):
+                one, before = np.array([blocked]), np.array([blocked - 1])
+                self._reach(q, one, found, q[before], before, found)  # raises, and says where the way ends
         return found
 
     def close_near(self, q: FloatArray, qpos: FloatArray) -> Assembly:

@@ -12,14 +12,21 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
 from workbench.reference.along import OrderedClosure
-from workbench.reference.continuation import ASTRAY, NEWTON_STEPS, Assembly
+from workbench.reference.closing import LINES, NEAR, Mechanism, advance, bench
+from workbench.reference.continuation import ASTRAY, NEWTON_STEPS, SMALLEST_STEP, Assembly
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import integrate, newton_step
+from workbench.reference.kinds import JOINT, TENDON
+from workbench.reference.kinematics import is_covered, kinematics_of
 from workbench.reference.rows import constraint_rows
 from workbench.reference.sides import pattern_of
 from workbench.reference.structure import Structure
 from workbench.reference.tables import Tables, tables_of
 from workbench.reference.tolerance import KEY, RANK
+
+CONFIRMED = 2.0
+"""By so many times what closes a loop MuJoCo may find it open at the pose in which the package's own kinematics closed
+it: both round."""
 
 FREE_STEPS = 60
 LONGEST_FREE_STEP = 0.2
@@ -29,12 +36,15 @@ LONGEST_FREE_STEP = 0.2
 class LoopCloser(OrderedClosure):
     """Closes the loops of one model."""
 
-    def __init__(self, engine: Engine, structure: Structure) -> None:
+    def __init__(self, engine: Engine, structure: Structure, *, compiled: bool = True) -> None:
         super().__init__(engine, structure)
+        self.mechanism = self._mechanism() if compiled and is_covered(engine.model) else None
         self._home = self._close_home(structure.home_qpos[None, :].copy())
         self.home = self._home.qpos[0]
         pattern, group = pattern_of(structure, self.joints[2])
         self._look_at_sides(self.jacobian(self.home), pattern, group, structure.passive)
+        if self.mechanism is not None:
+            self.mechanism = self.mechanism._replace(sides=self._side_table)
         self.start = self.home[structure.actuated_qpos]
 
     def _close_home(self, home: FloatArray) -> Assembly:
@@ -52,7 +62,37 @@ class LoopCloser(OrderedClosure):
             # axes that are parallel to six digits only leave no freedom, where the robot that is meant has some
             self._close_by_digits()
             found = self._newton_alone(found.qpos.copy(), found.qpos[:, self.structure.actuated_qpos])
+        self.confirm(np.abs(constraint_jacobian(self.engine, self.structure, self.joints, found.qpos)[1]), "home pose")
         return found
+
+    def _mechanism(self) -> Mechanism:
+        model, structure = self.engine.model, self.structure
+        joined = structure.blocks[structure.blocks[:, 0] != JOINT]
+        joined = joined[joined[:, 0] != TENDON][:, 3:5]
+        points = np.unique(joined[joined >= 0]).astype(np.int64)
+        return Mechanism(
+            kinematics_of(model, structure.frames, points, structure.home_qpos), self.tables.closures, self.joints,
+            structure.passive, structure.actuated, structure.actuated_qpos, *self._weights,
+        )  # fmt: skip
+
+    def confirm(self, residual: FloatArray, what: str = "") -> None:
+        """Refuse poses in which MuJoCo finds the loops open by *residual* ``(n,)``, although they were closed.
+
+        Raises
+        ------
+        ModelError
+            Kinematics of the package's own differ from MuJoCo's.
+        """
+        worst = int(np.argmax(residual)) if len(residual) else 0
+        if len(residual) and not residual[worst] <= CONFIRMED * self.tolerance.residual:
+            raise ModelError(
+                f"{self.structure.file}: {what or f'sample {worst}'}: MuJoCo finds the loops open by"
+                f" {residual[worst]:.3g} m where they were closed (allowed:"
+                f" {CONFIRMED * self.tolerance.residual:.3g}); this is a fault of the workbench, please report it with"
+                " the file",
+                file=self.structure.file,
+                value=float(residual[worst]),
+            )
 
     def _close_by_digits(self) -> None:
         self.tolerance = dataclasses.replace(self.tolerance, few_digits=True)
@@ -129,6 +169,10 @@ class LoopCloser(OrderedClosure):
         count = len(start)
         start[:, self.structure.actuated_qpos] = aim
         found = self._nothing(count, aim.shape[1])
+        if self.mechanism is not None:
+            room = bench(self.mechanism)
+            advance(self.mechanism, self.rules(), room, NEAR, start, start, 0, count, *found.arrays, np.zeros(0))
+            return found
         qpos = evaluator.qpos
         qpos[:count] = start
         # the floor: a closed sample gets one more step, which takes it to rounding; then it stays
@@ -144,6 +188,29 @@ class LoopCloser(OrderedClosure):
             if not len(active):
                 break
         return found
+
+    def _continue(
+        self,
+        evaluator: Evaluator,
+        here: Assembly,
+        origin: FloatArray,
+        target: FloatArray,
+        names: np.ndarray,
+        marked_below: float,
+    ) -> tuple[Assembly, np.ndarray]:
+        if self.mechanism is None:
+            return super()._continue(evaluator, here, origin, target, names, marked_below)
+        done = np.zeros(len(target))
+        rules = self.rules(marked_below or SMALLEST_STEP)
+        advance(
+            self.mechanism, rules, bench(self.mechanism), LINES, np.array(origin), np.array(target), 0, len(target),
+            *here.arrays, done,
+        )  # fmt: skip
+        if (done < 1.0).any() and not marked_below:
+            row = int(np.argmax(done < 1.0))
+            reached = origin[row] + (target[row] - origin[row]) * done[row]
+            self._refuse(int(names[row]), target[row], reached, here.at(slice(row, row + 1)))
+        return here, done >= 1.0
 
     def _refuse(self, sample: int, target: FloatArray, reached: FloatArray, there: Assembly) -> None:
         joint = int(np.argmax(np.abs(target - reached)))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.reference.closing import Rules
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import predict
 from workbench.reference.sides import NO_SIDES, UNKNOWN, SideTable, same_side, side_at, side_table
@@ -90,14 +91,16 @@ class Assembly:
 
     def at(self, rows: np.ndarray | slice) -> Assembly:
         """Some of the samples; with a slice, views."""
-        return Assembly(*(array[rows] for array in self._arrays()))
+        return Assembly(*(array[rows] for array in self.arrays))
 
     def put(self, rows: np.ndarray, other: Assembly, chosen: np.ndarray | slice = slice(None)) -> None:
         """Overwrite *rows* by the *chosen* samples of another assembly."""
-        for mine, others in zip(self._arrays(), other._arrays(), strict=True):
+        for mine, others in zip(self.arrays, other.arrays, strict=True):
             mine[rows] = others[chosen]
 
-    def _arrays(self) -> tuple[np.ndarray, ...]:
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """The arrays as the kernels take them."""
         return self.qpos, self.residual, self.tangent, self.rank, self.condition, self.weakest, self.side
 
 
@@ -245,6 +248,14 @@ class Continuation(ABC):
             active = active[~blocked]
             active = active[done[active] < 1.0]
         return here, done >= 1.0
+
+    def rules(self, smallest: float = SMALLEST_STEP) -> Rules:
+        """The bounds above as the kernels take them."""
+        tolerance = self.tolerance
+        return Rules(
+            tolerance.residual, tolerance.floor, ASTRAY * tolerance.size, tolerance.few_digits, NEWTON_STEPS,
+            CORRECTION, LONGEST_STEP, ALMOST, NEGLIGIBLE, smallest,
+        )  # fmt: skip
 
     def _predict(self, here: Assembly, rows: np.ndarray, change: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Tangent predictor: distance moved by a change of the given coordinates, and where that leads."""

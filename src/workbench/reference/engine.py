@@ -198,17 +198,17 @@ class Engine:
             copied.flags.writeable = False
         return Poses(*copies)
 
-    def in_blocks(self, work: Callable[[Evaluator, slice], None], samples: int) -> None:
+    def in_blocks(self, work: Callable[[Evaluator, slice], None], samples: int, size: int = BLOCK) -> None:
         """Call *work* for each block of samples, over the engine's threads; it writes its own rows of shared arrays."""
 
         def one(first: int) -> None:
             evaluator = self._take()
             try:
-                work(evaluator, slice(first, min(first + BLOCK, samples)))
+                work(evaluator, slice(first, min(first + size, samples)))
             finally:
                 self._idle.put(evaluator)
 
-        starts = range(0, samples, BLOCK)
+        starts = range(0, samples, size)
         with engine_warnings():
             if self.threads == 1 or len(starts) == 1:
                 for first in starts:

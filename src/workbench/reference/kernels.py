@@ -11,7 +11,7 @@ import numpy as np
 
 from workbench.compiled import compiled, inlined
 from workbench.reference.kinds import BALL, CONNECT, FREE, WELD
-from workbench.reference.linear import factor, solve, solve_transposed
+from workbench.reference.linear import factor, solve, solve_transposed, solved
 from workbench.reference.rows import acceleration_rows, body_motion, constraint_rows, point_motion
 from workbench.reference.sides import UNKNOWN, side_of
 
@@ -117,8 +117,7 @@ def newton_step(  # type: ignore[no-untyped-def]
     passive, actuated = split
     m, nv, p, na = closures.block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
-    # columns side by side in memory: the factor works along them
-    a, beta, perm, x = np.empty((p, m)).T, np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
+    a, beta, perm, x = np.empty((m, p)), np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
     step, work = np.zeros(nv), np.empty((p, p))
     active = np.empty_like(ids)
     more = 0
@@ -164,8 +163,8 @@ def newton_step(  # type: ignore[no-untyped-def]
 @compiled
 def projection(  # type: ignore[no-untyped-def]
     closures, joints, split, bodies, poses, dynamics, mass_layout, platform, masses, gravity, base_rotation,
-    base_position, qpos, qvel, tangent, qdd, applied, qacc, tau, velocity_residual, acceleration_residual, motion,
-    turning, reactions, slack,
+    base_position, qpos, qvel, tangent, qdd, applied, qacc, tau, closure_residual, velocity_residual,
+    acceleration_residual, motion, turning, reactions, slack,
 ):  # fmt: skip
     """Accelerations, actuator torques, platform motion and reaction forces of a block.
 
@@ -186,35 +185,36 @@ def projection(  # type: ignore[no-untyped-def]
     m, nv, p, na = block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     nbody = masses.shape[0]
     jac, res, rates = np.empty((m, nv)), np.empty(m), np.empty(m)
-    # columns side by side in memory: the factor works along them
-    a, beta, perm, x = np.empty((p, m)).T, np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
+    a, beta, perm, x = np.empty((m, p + 1)), np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
     force, passive_force, multipliers = np.empty(nv), np.empty(p), np.empty(m)
     v, acc, carried = np.empty((nbody, 6)), np.empty((nbody, 6)), np.empty((nbody, 3))
     for s in range(qpos.shape[0]):
         constraint_rows(closures, joints, qpos[s], cdof[s], com[s], site_xpos[s], site_xquat[s], anchors[s], jac, res)
-        worst = 0.0
+        worst, open_by = 0.0, 0.0
         for i in range(m):
             value = 0.0
             for d in range(nv):
                 value += jac[i, d] * qvel[s, d]
-            worst = max(worst, abs(value))
-        velocity_residual[s] = worst
+            # a maximum passes over what is no number
+            worst = math.inf if math.isnan(value) else max(worst, abs(value))
+            open_by = math.inf if math.isnan(res[i]) else max(open_by, abs(res[i]))
+        closure_residual[s], velocity_residual[s] = open_by, worst
         _along(tangent[s], qdd[s], qacc[s])
         body_motion(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], v, acc)
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
         for i in range(m):
-            res[i] = -rates[i]
+            a[i, p] = -rates[i]
             for j in range(p):
                 a[i, j] = jac[i, passive[j]]
         rank = factor(a, beta, perm)
-        solve(a, beta, perm, rank, res, x)
+        solved(a, perm, rank, p, x)
         for j in range(p):
             qacc[s, passive[j]] += x[j]
         body_motion(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], v, acc)
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
         worst = 0.0
         for i in range(m):
-            worst = max(worst, abs(rates[i]))
+            worst = math.inf if math.isnan(rates[i]) else max(worst, abs(rates[i]))
         acceleration_residual[s] = worst
         # generalized force of the motion
         for d in range(nv):

@@ -17,30 +17,43 @@ RANK_TOLERANCE = 1e-10
 """A column counts as dependent when its pivot is below this fraction of the largest one."""
 
 
+DIGITS_LEFT = 1e-3
+"""A squared column length that fell below this fraction of what was last summed up is summed up again."""
+
+
 @compiled
 def factor(a, beta, perm):  # type: ignore[no-untyped-def]
     """Factor ``a (m, p)`` in place; returns the rank. Reflectors below the diagonal, R on and above it.
 
-    ``beta (p,)`` receives the reflector scales, ``perm (p,)`` the column order.
+    ``beta (p,)`` receives the reflector scales, ``perm (p,)`` the column order. Where ``a`` has more columns than
+    ``perm`` entries, those are right-hand sides b and become Q^T b, for `solved`.
     """
-    m, p = a.shape
+    m, p, width = a.shape[0], perm.shape[0], a.shape[1]
     steps = min(m, p)
+    sums, left, known = np.empty(width), np.zeros(p), np.empty(p)
     for j in range(p):
         perm[j] = j
+    # row by row, all columns at a time: the compiler can vectorise it, and rows where a column is zero cost nothing
+    for i in range(m):
+        for j in range(p):
+            left[j] += a[i, j] * a[i, j]
+    for j in range(p):
+        known[j] = left[j]
     rank = 0
     first = 0.0
     for k in range(steps):
         best, pivot = -1.0, k
         for j in range(k, p):
-            s = 0.0
-            for i in range(k, m):
-                s += a[i, j] * a[i, j]
-            if s > best:
-                best, pivot = s, j
+            if left[j] > best:
+                best, pivot = left[j], j
         if pivot != k:
             for i in range(m):
                 a[i, k], a[i, pivot] = a[i, pivot], a[i, k]
             perm[k], perm[pivot] = perm[pivot], perm[k]
+            left[pivot], known[pivot] = left[k], known[k]
+        best = 0.0
+        for i in range(k, m):
+            best += a[i, k] * a[i, k]
         norm = math.sqrt(best)
         if k == 0:
             first = norm
@@ -55,19 +68,45 @@ def factor(a, beta, perm):  # type: ignore[no-untyped-def]
         scale = 1.0 / (head - alpha)
         beta[k] = (alpha - head) / alpha
         a[k, k] = alpha
+        for j in range(k + 1, width):
+            sums[j] = a[k, j]
         for i in range(k + 1, m):
             a[i, k] *= scale
+            v = a[i, k]
+            if v != 0.0:
+                for j in range(k + 1, width):
+                    sums[j] += v * a[i, j]
+        for j in range(k + 1, width):
+            sums[j] *= beta[k]
+            a[k, j] -= sums[j]
+        for i in range(k + 1, m):
+            v = a[i, k]
+            if v != 0.0:
+                for j in range(k + 1, width):
+                    a[i, j] -= sums[j] * v
+        # what is left of a column's length: taken off, and looked at again where that would lose digits
         for j in range(k + 1, p):
-            s = a[k, j]
-            for i in range(k + 1, m):
-                s += a[i, k] * a[i, j]
-            s *= beta[k]
-            a[k, j] -= s
-            for i in range(k + 1, m):
-                a[i, j] -= s * a[i, k]
+            left[j] -= a[k, j] * a[k, j]
+            if not left[j] > DIGITS_LEFT * known[j]:
+                left[j] = 0.0
+                for i in range(k + 1, m):
+                    left[j] += a[i, j] * a[i, j]
+                known[j] = left[j]
     for j in range(steps, p):
         beta[j] = 0.0
     return rank
+
+
+@compiled
+def solved(a, perm, rank, column, x):  # type: ignore[no-untyped-def]
+    """Least squares for a right-hand side that was factored along, in a column of ``a``; x ``(p,)``."""
+    for j in range(perm.shape[0]):
+        x[j] = 0.0
+    for k in range(rank - 1, -1, -1):
+        s = a[k, column]
+        for j in range(k + 1, rank):
+            s -= a[k, j] * x[perm[j]]
+        x[perm[k]] = s / a[k, k]
 
 
 @compiled

@@ -30,7 +30,7 @@ from workbench.reference.platform_closure import PlatformCloser
 from workbench.reference.platform_side import PlatformSide
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
-from workbench.reference.result import Mobility, ReferenceResult
+from workbench.reference.result import Mobility, ReferenceResult, refuse_overflow
 from workbench.reference.structure import Structure, structure_of
 from workbench.reference.tolerance import few_digits_note, rank_of
 from workbench.robots.load import LoadedModel, load_model
@@ -231,7 +231,7 @@ class MujocoReference(PlatformSide):
         qpos, (qvel, qacc) = assembly.qpos, np.zeros((2, n, model.nv))
         tau, motion, energy = np.zeros_like(q), np.zeros((3, n, 3)), np.zeros((n, 2))
         turning = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
-        velocity_residual, acceleration_residual = np.zeros((2, n))
+        closure_residual, velocity_residual, acceleration_residual = np.zeros((3, n))
         # the kernel fills a row for every body, also for fixed ones that follow the last joint
         reactions = np.zeros((len(structure.blocks) + model.nbody, n, 3))
         velocities(assembly.tangent, qd, qvel)
@@ -251,14 +251,17 @@ class MujocoReference(PlatformSide):
             projection(
                 *self._tables, poses.tables, dynamics.tables, self._mass_layout, platform, masses, gravity,
                 self._base_rotation, self._base_position, qpos[rows], qvel[rows], assembly.tangent[rows], qdd[rows],
-                force[rows], qacc[rows], tau[rows], velocity_residual[rows], acceleration_residual[rows],
-                motion[:, rows], (turning[0][rows], turning[1][rows], turning[2][rows]), reactions[:, rows],
-                slack[rows],
+                force[rows], qacc[rows], tau[rows], closure_residual[rows], velocity_residual[rows],
+                acceleration_residual[rows], motion[:, rows], (turning[0][rows], turning[1][rows], turning[2][rows]),
+                reactions[:, rows], slack[rows],
             )  # fmt: skip
             energy[rows] = dynamics.energy[: rows.stop - rows.start]
 
         engine.in_blocks(block, n)
+        # beyond this rate MuJoCo sets the state back; such samples are refused for their rates
+        self._closer.confirm(np.where(np.abs(qvel).max(axis=1) < mujoco.mjMAXVAL, closure_residual, 0.0))
         self._refuse_singular(q, qd, assembly.rank, velocity_residual, assembly.weakest)
+        refuse_overflow("torques", tau, qd)
         if times is not None:
             refuse_jumps(times, structure, self._closer.joints, qpos, qvel, qacc)
         # in MuJoCo dry friction is a constraint, so neither bias nor passive forces hold it
@@ -267,7 +270,7 @@ class MujocoReference(PlatformSide):
         return ReferenceResult(
             tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], rotation=turning[0], omega=turning[1],
             alpha=turning[2], reactions=known,
-            closure_residual=assembly.residual.copy(), velocity_residual=velocity_residual,
+            closure_residual=closure_residual, velocity_residual=velocity_residual,
             acceleration_residual=acceleration_residual, rank=assembly.rank.copy(),
             condition=assembly.condition.copy(), energy=energy, qpos=qpos.copy(), qvel=qvel, qacc=qacc,
             slack=slack if few_digits else np.zeros_like(tau),

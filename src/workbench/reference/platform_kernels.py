@@ -34,8 +34,7 @@ def platform_newton(  # type: ignore[no-untyped-def]
     m = loops + given
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
     values, rise, still = np.empty(given), np.empty(given), np.zeros(3)
-    # columns side by side in memory: the factor works along them
-    a, beta, perm, x = np.empty((nv, m)).T, np.empty(nv), np.empty(nv, dtype=np.int64), np.empty(nv)
+    a, beta, perm, x = np.empty((m, nv)), np.empty(nv), np.empty(nv, dtype=np.int64), np.empty(nv)
     work = np.empty((nv, nv))
     active = np.empty_like(ids)
     more = 0
@@ -94,8 +93,7 @@ def platform_accelerations(  # type: ignore[no-untyped-def]
     m, nbody = loops + given, root.shape[0]
     jac, res, rates = np.empty((m, nv)), np.empty(m), np.empty(m)
     values, rise, still = np.empty(given), np.empty(given), np.zeros(3)
-    # columns side by side in memory: the factor works along them
-    a, beta, perm, x = np.empty((nv, m)).T, np.empty(nv), np.empty(nv, dtype=np.int64), np.empty(nv)
+    a, beta, perm, x = np.empty((m, nv)), np.empty(nv), np.empty(nv, dtype=np.int64), np.empty(nv)
     v, acc = np.empty((nbody, 6)), np.empty((nbody, 6))
     for s in range(aim.shape[0]):
         constraint_rows(closures, joints, qpos[s], cdof[s], com[s], site_xpos[s], site_xquat[s], anchors[s], jac, res)

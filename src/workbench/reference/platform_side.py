@@ -19,6 +19,7 @@ from workbench.reference.closure import LoopCloser
 from workbench.reference.continuation import Assembly
 from workbench.reference.platform_closure import PlatformCloser
 from workbench.reference.redundant import CONSISTENT, refuse_inconsistent
+from workbench.reference.result import refuse_overflow
 from workbench.reference.task import POSITIONS, task_motion, task_of
 
 if TYPE_CHECKING:
@@ -111,6 +112,7 @@ class PlatformSide(ABC):
                 joint=joint,
                 value=x[sample].tolist(),
             )
+        refuse_overflow("accelerations", qacc, xd)
         actuated = closer.structure.actuated
         return assembly.qpos[:, closer.structure.actuated_qpos], qvel[:, actuated], qacc[:, actuated]
 

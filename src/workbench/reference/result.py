@@ -7,6 +7,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.errors import MotionError
+
+
+def refuse_overflow(what: str, values: FloatArray, rates: FloatArray) -> None:
+    """Refuse samples whose results ``(n, m)`` are no finite numbers.
+
+    Raises
+    ------
+    MotionError
+        Naming the first sample and its rates ``(n, k)``.
+    """
+    bad = ~np.isfinite(values).all(axis=1)
+    if bad.any():
+        sample = int(np.argmax(bad))
+        raise MotionError(
+            f"sample {sample}: rates so large that {what} overflow ({', '.join(f'{v:.3g}' for v in rates[sample])})",
+            sample=sample,
+            value=rates[sample].tolist(),
+        )
 
 
 @dataclass(frozen=True)

@@ -176,7 +176,7 @@ def side_table(jacobian: FloatArray, pattern: np.ndarray, group: IntArray, colum
         sizes.append(float(np.exp(np.linalg.slogdet(jacobian[np.ix_(own, mine)])[1] / len(mine))))
         least.append(POOR if len(whole) > len(own) else 0.0)
     return SideTable(
-        np.concatenate(rows),
+        np.concatenate(rows).astype(np.int64),  # pivots of LAPACK are shorter, and another type for the kernels
         np.asarray(columns, dtype=np.int64)[np.concatenate(places)],
         _starts(rows),
         np.array(sizes),
@@ -193,7 +193,7 @@ def _starts(parts: list[np.ndarray]) -> IntArray:
 def side_at(jacobian: FloatArray, columns: IntArray, table: SideTable) -> int:
     """Side of one configuration with rows ``(m, nv)``, of which *columns* are solved for."""
     p = len(columns)
-    rank = factor(np.asfortranarray(jacobian[:, columns]), np.empty(p), np.empty(p, dtype=np.int64))
+    rank = factor(np.ascontiguousarray(jacobian[:, columns]), np.empty(p), np.empty(p, dtype=np.int64))
     return int(side_of(jacobian, rank, table, np.empty((p, p))))
 
 

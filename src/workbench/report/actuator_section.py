@@ -76,7 +76,7 @@ def limits_table(found: list[Margin], anchors: Mapping[str, str]) -> Table:
         "actuator-limits",
         "Actuators against their limits: of each limit the case that takes most of it.",
         columns(
-            ("Actuator", "Figure", *numeric[:3], "Case", "At", "Cases beyond", "", "Source of the limit"),
+            ("Actuator", "Figure", *numeric[:3], "Case", "At", "Cases beyond", "Big enough", "Source of the limit"),
             (*numeric, "Cases beyond"),
         ),
         tuple(rows),

@@ -43,6 +43,8 @@ def draw(plots: Sequence[Plot], show: Show | None = None, *, second: bool = Fals
                 gc.collect()
             _ = plot.svg
             drawn.add(number)
+        if show:
+            show(len(plots), len(plots))
 
 
 def can_fork() -> bool:

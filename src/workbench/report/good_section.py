@@ -55,7 +55,7 @@ def good_table(run: Run, good: float, anchors: Mapping[str, str]) -> Table:
     joints = [joint_heading(run, joint) for joint in run.manifest.joints]
     return Table(
         "good-enough",
-        f"Is it good enough, within {percent(good)} of the reference's peak on every joint?",
+        f"Is it good enough, within {100 * good:.3g} % of the reference's peak on every joint?",
         columns(("Case", "Candidate", "Reference", *joints, "Good enough"), joints),
         tuple(rows),
         "Peak error max|Δτ| / max|τ_ref| of that joint over the case; ✓ keeps the wanted accuracy, ✗ exceeds it, ?"

@@ -261,7 +261,7 @@ def _panel(
         axes.locator_params(nbins=5)
         axes.set_xlabel(view.title)
         if size_of(figure)[0] < NARROW and box[2] < 0.5:  # beside the axis it would run into the neighbour
-            axes.set_title(view.side)
+            axes.annotate(view.side, (0.03, 0.98), xycoords="axes fraction", va="top")
         else:
             axes.set_ylabel(view.side)
         return axes

@@ -26,6 +26,8 @@ MOST_CASES = 24
 """Cases that the figure has room for; of more, the worst."""
 WIDTH, ROW, LETTER = 10.0, 0.2, 0.072
 """inches: of the figure, of a case, of a letter"""
+NARROW = 7.0
+"""inches from which on there is room for more labels; in the style of a paper there is less"""
 LARGEST_DRAWN = 1e3
 """Errors above this, and such that are no number, are drawn here."""
 MEASURED = (*WITHOUT_BOUND, RECORDED)
@@ -174,7 +176,8 @@ def _log_x(axes: Axes, values: Sequence[float], label: object) -> None:
     top = max(top, bottom + 2)
     axes.set_xscale("log")
     axes.set_xlim(10.0**bottom, 10.0**top)
-    step = math.ceil((top - bottom) / 6)
+    labels = 6 if size_of(axes.figure)[0] > NARROW else 3
+    step = math.ceil((top - bottom) / labels)
     axes.xaxis.set_major_locator(FixedLocator([10.0**power for power in range(bottom, top + 1, step)]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: label(round(math.log10(value)))))  # type: ignore[operator]
     axes.minorticks_off()

@@ -37,8 +37,10 @@ FULL_WIDTH_FROM = 7.0
 """inches: figures designed wider than this take the whole width of the page"""
 COLUMN, TEXT = 229.0, 344.0
 """TeX points: a column of a two-column article, and the text of a one-column article."""
+POINTS = 72.27
+"""TeX's points in an inch."""
 LEAST_HEIGHT = 0.8
-"""Of the height on a page: panels side by side shrink, panels above each other need their room."""
+"""Of the height on a page: panels above each other need their room."""
 LONG = 36
 """Letters from which on a column of a table breaks its lines."""
 FONTS = {"page": "DejaVu Sans", "paper": "DejaVu Serif"}
@@ -83,7 +85,9 @@ def figure_pdf(plot: Plot, style: str = "page") -> bytes:
 def article_size(plot: Plot) -> tuple[float, float]:
     """Width and height in inches on which a figure needs no scaling: of a column, or of the text where it is wide."""
     width, height = plot.size
-    room = (TEXT if width > FULL_WIDTH_FROM else COLUMN) / 72.27  # TeX's points
+    if width > FULL_WIDTH_FROM:  # panels beside each other, which become narrow enough
+        return TEXT / POINTS, height
+    room = COLUMN / POINTS
     return room, height * max(room / width, LEAST_HEIGHT)
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.campaign import store
+from workbench.campaign.actuators import limits_of
 from workbench.campaign.changes import Variant, changes_of
 from workbench.campaign.conclusion import Conclusion
 from workbench.campaign.evidence import Effort
@@ -347,6 +348,7 @@ def _manifest(
             }
             for c in campaign.candidate
         },
+        "actuators": limits_of(campaign, plan.robot, str(file)),
         "claims": [],
         "figures": [],
         "cases": {},

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from workbench.campaign.conclusion import GOOD
+from workbench.campaign.margins import IN_SWEEPS
 from workbench.report.section import Section
 from workbench.report.sections import NO_REAL_ROBOT, parameters_section, reproduce_section
 from workbench.report.sweep.cases import trouble_section, worst_section
@@ -53,6 +54,7 @@ def _limits_section(run: SweepRun) -> Section:
     lost = sum(count for name, count in run.summary.counts.items() if name not in GOOD)
     points = [
         NO_REAL_ROBOT,
+        *([IN_SWEEPS] if run.manifest.actuators else []),
         "Shares and quantiles are of these designs: they say how the error is spread over the ranges that the campaign "
         "chose, with the weight that it gave them, and not how likely a design is.",
         "Every design follows the case's motion, made faster or slower where the campaign says so. On another path the "

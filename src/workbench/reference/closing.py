@@ -1,0 +1,361 @@
+"""Loops closed in machine code: Newton on the passive joints, straight lines followed step by step, motions in order.
+
+The arithmetic of `workbench.reference.continuation` and `workbench.reference.closure` for one sample at a time, on
+positions by `workbench.reference.kinematics`. The rules that keep a sample on its branch are those of the former, word
+for word; what is reached is a proposal that MuJoCo's own evaluation has to confirm.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from workbench.arrays import FloatArray
+from workbench.compiled import compiled, merged
+from workbench.reference.kernels import integrate, keep_if_better
+from workbench.reference.kinematics import Kinematics, Places, place, room
+from workbench.reference.linear import factor, solved
+from workbench.reference.rows import constraint_rows
+from workbench.reference.sides import NO_SIDES, UNKNOWN, SideTable, same_side, side_of
+from workbench.reference.tables import ClosureTables
+
+NEAR, LINES, CHAIN = 0, 1, 2
+"""Ways to close samples, see `advance`."""
+
+
+class Mechanism(NamedTuple):
+    """All that is known of a model's loops."""
+
+    kinematics: Kinematics
+    closures: ClosureTables
+    joints: tuple[np.ndarray, np.ndarray, np.ndarray]
+    passive: np.ndarray
+    actuated: np.ndarray
+    actuated_qpos: np.ndarray
+    weights: FloatArray
+    """``(nv,)`` what a unit of each velocity counts"""
+    coordinate_weights: FloatArray
+    """``(nq,)``"""
+    sides: SideTable = NO_SIDES
+    """known once the home pose is closed"""
+
+
+class Rules(NamedTuple):
+    """Bounds of `workbench.reference.continuation` and `workbench.reference.tolerance`."""
+
+    closed: float
+    floor: float
+    astray: float
+    settles: bool
+    """loops agree only to some digits: every Newton step counts and the last is kept"""
+    steps: int
+    """Newton steps at most"""
+    correction: float
+    longest: float
+    almost: float
+    negligible: float
+    smallest: float
+    """a smaller part of the way means that the way is blocked"""
+
+
+class Bench(NamedTuple):
+    """Room for the work on one sample."""
+
+    places: Places
+    seen: Places
+    """views of the same that may not be written to, as MuJoCo's own: to kernels another type"""
+    qpos: FloatArray
+    kept: FloatArray
+    predicted: FloatArray
+    here: FloatArray
+    """the closed configuration that a way begins at, and then the last one reached"""
+    tangent: FloatArray
+    tangent_here: FloatArray
+    tangent_before: FloatArray
+    facts: FloatArray
+    """``(4,)`` residual, rank, condition, weakest"""
+    facts_here: FloatArray
+    sides: np.ndarray
+    """``(2,)`` of the last closing, and here: on which side of their singular poses"""
+    jacobian: FloatArray
+    before: FloatArray
+    """``(1, m, nv)``, as `after` and ``same (1,)`` for `same_side`"""
+    after: FloatArray
+    same: np.ndarray
+    work: FloatArray
+    residual: FloatArray
+    a: FloatArray
+    beta: FloatArray
+    order: np.ndarray
+    x: FloatArray
+    step: FloatArray
+    bend: FloatArray
+    """``(nv,)`` added to the first prediction before Newton begins: what the tangent's own change is worth"""
+    best: FloatArray
+    ways: FloatArray
+    """``(4, na)`` the way, where a step leads, its change, and where the way begins"""
+
+
+def bench(mechanism: Mechanism) -> Bench:
+    """Room for one sample of a mechanism. Made by NumPy: compiled, making it takes longer than all that it is for."""
+    m, p, na = int(mechanism.closures.block_rows[-1]), len(mechanism.passive), len(mechanism.actuated)
+    nq, nv = len(mechanism.coordinate_weights), len(mechanism.weights)
+    places = room(mechanism.kinematics, nv)
+    seen = Places(*(array.view() for array in places))
+    for array in seen:
+        array.flags.writeable = False
+    return Bench(
+        places, seen, np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros((nv, na)),
+        np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros(2, dtype=np.int64),
+        np.zeros((m, nv)), np.zeros((1, m, nv)), np.zeros((1, m, nv)), np.zeros(1, dtype=np.bool_),
+        np.zeros((p, p)), np.zeros(m),
+        np.zeros((m, p + na + 1)), np.zeros(p), np.zeros(p, dtype=np.int64), np.zeros(p), np.zeros(nv), np.zeros(nv),
+        np.zeros(1), np.zeros((4, na)),
+    )  # fmt: skip
+
+
+@merged
+def _factored(passive, actuated, jacobian, residual, a, beta, order):  # type: ignore[no-untyped-def]
+    """Factor the passive columns of the Jacobian, the actuated ones and the residual along; returns the rank."""
+    p, na = passive.shape[0], actuated.shape[0]
+    for i in range(a.shape[0]):
+        for j in range(p):
+            a[i, j] = jacobian[i, passive[j]]
+        for j in range(na):
+            a[i, p + j] = -jacobian[i, actuated[j]]
+        a[i, p + na] = -residual[i]
+    return factor(a, beta, order)
+
+
+@merged
+def _noted(passive, actuated, a, order, found, x, tangent, facts):  # type: ignore[no-untyped-def]
+    """Velocities per actuated velocity, rank, condition and weakest freedom, from the last factor."""
+    p, na = passive.shape[0], actuated.shape[0]
+    for j in range(na):
+        solved(a, order, found, p + j, x)
+        for k in range(p):
+            tangent[passive[k], j] = x[k]
+        for k in range(na):
+            tangent[actuated[k], j] = 1.0 if k == j else 0.0
+    facts[1] = found
+    if p == 0:  # an open chain: nothing to solve for
+        facts[2], facts[3] = 1.0, actuated[0]
+    else:
+        facts[2] = abs(a[0, 0] / a[p - 1, p - 1]) if found == p else math.inf
+        facts[3] = passive[order[min(found, p - 1)]]
+
+
+@compiled
+def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
+    """Newton on the passive joints from `Bench.qpos`, which is overwritten.
+
+    The best configuration met goes to `Bench.kept`, its residual to `Bench.facts`; where it is closed, also tangent,
+    rank, condition and weakest freedom.
+    """
+    kin, closures, joints, seen = mechanism.kinematics, mechanism.closures, mechanism.joints, w.seen
+    passive, actuated, qpos, step, x = mechanism.passive, mechanism.actuated, w.qpos, w.step, w.x
+    limits = (rules.closed, rules.floor, rules.astray, rules.settles)
+    w.best[0] = math.inf
+    w.sides[0] = UNKNOWN
+    w.facts[1], w.facts[2], w.facts[3] = 0.0, math.inf, 0.0
+    for _ in range(rules.steps):
+        place(kin, qpos, w.places)
+        constraint_rows(
+            closures, joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat, seen.anchors, w.jacobian,
+            w.residual,
+        )  # fmt: skip
+        again, good = keep_if_better(w.residual, limits, qpos, w.kept, w.best, 0)
+        if not (again or good):
+            break
+        found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order)
+        if good:
+            _noted(passive, actuated, w.a, w.order, found, x, w.tangent, w.facts)
+            if w.sides[0] == UNKNOWN or rules.settles:  # the step to rounding does not change it
+                w.sides[0] = side_of(w.jacobian, found, mechanism.sides, w.work)
+        if not again:
+            break
+        solved(w.a, w.order, found, w.a.shape[1] - 1, x)
+        for j in range(actuated.shape[0]):
+            step[actuated[j]] = 0.0
+        for j in range(passive.shape[0]):
+            step[passive[j]] = x[j]
+        integrate(qpos, step, joints, qpos)
+    w.facts[0] = w.best[0]
+
+
+@merged
+def _along(tangent, rates, out):  # type: ignore[no-untyped-def]
+    for d in range(tangent.shape[0]):
+        value = 0.0
+        for j in range(tangent.shape[1]):
+            value += tangent[d, j] * rates[j]
+        out[d] = value
+
+
+@merged
+def _length(values, weights):  # type: ignore[no-untyped-def]
+    squared = 0.0
+    for d in range(values.shape[0]):
+        squared += (values[d] * weights[d]) ** 2
+    return math.sqrt(squared)
+
+
+@merged
+def _copy(values, out):  # type: ignore[no-untyped-def]
+    """Loops: assigning a slice takes numba seconds to compile."""
+    for i in range(out.shape[0]):
+        out[i] = values[i]
+
+
+@merged
+def _copy_rows(values, out):  # type: ignore[no-untyped-def]
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = values[i, j]
+
+
+@merged
+def _on_side(mechanism, w):  # type: ignore[no-untyped-def]
+    """Whether the step from ``Bench.here`` to ``Bench.kept`` passes no singular pose, as `Continuation._on_side`."""
+    before, after, table = w.sides[1], w.sides[0], mechanism.sides
+    redundant = False
+    for block in range(table.least.shape[0]):
+        redundant |= table.least[block] > 0.0
+    if not redundant:
+        if after == UNKNOWN:
+            w.sides[0] = before
+        return before == UNKNOWN or before == w.sides[0]
+    if (before == after and after != UNKNOWN) or w.facts[1] < table.columns.shape[0]:
+        return True
+    kin, seen = mechanism.kinematics, w.seen
+    for second in range(2):
+        qpos, rows = (w.kept, w.after[0]) if second else (w.here, w.before[0])
+        place(kin, qpos, w.places)
+        constraint_rows(
+            mechanism.closures, mechanism.joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat,
+            seen.anchors, rows, w.residual,
+        )  # fmt: skip
+    same_side(w.before, w.after, table, w.work, w.same)
+    return w.same[0]
+
+
+@merged
+def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
+    """Follow the straight line from ``Bench.ways[3]`` to *target* ``(na,)``; returns how much of it was gone, 0 to 1.
+
+    ``Bench.here`` and its like are the closed configuration at the beginning, and then the last one reached.
+    """
+    way, aim, change, origin = w.ways[0], w.ways[1], w.ways[2], w.ways[3]
+    na = way.shape[0]
+    for j in range(na):
+        way[j] = target[j] - origin[j]
+    done, step = 0.0, 1.0
+    while done < 1.0:
+        _along(w.tangent_here, way, w.step)
+        longest = rules.almost * rules.longest / _length(w.step, mechanism.weights)
+        part = min(step, 1.0 - done, longest)
+        last = done + part >= 1.0
+        for j in range(na):
+            aim[j] = target[j] if last else origin[j] + way[j] * (done + part)
+            change[j] = way[j] * part
+        _along(w.tangent_here, change, w.step)
+        moved = _length(w.step, mechanism.weights)
+        integrate(w.here, w.step, mechanism.joints, w.predicted)
+        if part == 1.0:
+            for d in range(w.step.shape[0]):
+                w.step[d] += w.bend[d]
+        integrate(w.here, w.step, mechanism.joints, w.qpos)
+        for j in range(na):
+            w.qpos[mechanism.actuated_qpos[j]] = w.predicted[mechanism.actuated_qpos[j]] = aim[j]
+        close_one(mechanism, rules, w)
+        squared = 0.0
+        for i in range(w.here.shape[0]):
+            squared += ((w.kept[i] - w.predicted[i]) * mechanism.coordinate_weights[i]) ** 2
+        correction = math.sqrt(squared)
+        small = correction <= max(rules.correction * moved, rules.negligible)
+        if w.facts[0] <= rules.closed and small and moved <= rules.longest and _on_side(mechanism, w):
+            _copy(w.kept, w.here)
+            w.sides[1] = w.sides[0]
+            _copy_rows(w.tangent, w.tangent_here)
+            _copy(w.facts, w.facts_here)
+            done = 1.0 if last else done + part
+            step *= 2.0
+            if longest < rules.smallest and done < 1.0:
+                return done
+        else:
+            step = 0.5 * part
+            if not step >= rules.smallest:
+                return done
+    return done
+
+
+@merged
+def _bend(w, target, s, size):  # type: ignore[no-untyped-def]
+    """Fill `Bench.bend` for the step to sample *s*, after one of length *size* or, for NaN, none; returns it."""
+    na = target.shape[1]
+    longer = 0.0
+    for j in range(na):
+        longer += (target[s, j] - target[s - 1, j]) ** 2
+    longer = math.sqrt(longer)
+    scale = 0.5 * longer / size if size > 0.0 else 0.0
+    for d in range(w.bend.shape[0]):
+        value = 0.0
+        for j in range(na):
+            value += (w.tangent_here[d, j] - w.tangent_before[d, j]) * (target[s, j] - target[s - 1, j])
+        w.bend[d] = scale * value
+    return longer
+
+
+@compiled
+def advance(  # type: ignore[no-untyped-def]
+    mechanism, rules, w, how, start, target, first, last, qpos, residual, tangent, rank, condition, weakest, side, done
+):  # fmt: skip
+    """Close samples *first* to *last* - 1 in one of three ways; a single kernel, which compiles once.
+
+    `NEAR`: Newton alone, from each of ``start (n, nq)``. `LINES`: along straight lines from ``start (n, na)`` to
+    ``target (n, na)``; the arrays hold the configurations at the start, then those reached, and ``done (n,)`` becomes
+    the part of each way that was gone. `CHAIN`: a motion ``target (n, na)``, each sample from the one before, the first
+    from the arrays' row before it; Newton begins where the change of the tangent over the step before, carried on,
+    leads, and what is accepted is judged from the tangent alone, as everywhere.
+
+    Returns the first sample of a chain that was not reached, else *last*.
+    """
+    size = math.nan
+    for d in range(w.bend.shape[0]):
+        w.bend[d] = 0.0
+    for s in range(first, last):
+        if how == NEAR:
+            _copy(start[s], w.qpos)
+            close_one(mechanism, rules, w)
+            _copy(w.kept, w.here)
+            _copy(w.facts, w.facts_here)
+            w.sides[1] = w.sides[0]
+            for i in range(w.tangent.shape[0]):
+                for j in range(w.tangent.shape[1]):
+                    w.tangent_here[i, j] = w.tangent[i, j] if w.facts[0] <= rules.closed else 0.0
+        else:
+            if how == LINES or s == first:
+                r = s if how == LINES else s - 1
+                _copy(qpos[r], w.here)
+                _copy_rows(tangent[r], w.tangent_here)
+                w.facts_here[0], w.facts_here[1] = residual[r], rank[r]
+                w.facts_here[2], w.facts_here[3] = condition[r], weakest[r]
+                w.sides[1] = side[r]
+            if how == LINES:
+                _copy(start[s], w.ways[3])
+            else:
+                _copy(target[s - 1], w.ways[3])
+                size = _bend(w, target, s, size)
+                _copy_rows(w.tangent_here, w.tangent_before)
+            gone = _follow_line(mechanism, rules, w, target[s])
+            if how == LINES:
+                done[s] = gone
+            elif gone < 1.0:
+                return s
+        _copy(w.here, qpos[s])
+        _copy_rows(w.tangent_here, tangent[s])
+        residual[s], rank[s] = w.facts_here[0], np.int64(w.facts_here[1])
+        condition[s], weakest[s], side[s] = w.facts_here[2], np.int64(w.facts_here[3]), w.sides[1]
+    return last
