@@ -24,7 +24,7 @@ from workbench.metrics import relative_error
 from workbench.report import build_report
 from workbench.report.cost import cost_table
 from workbench.report.load import load_run
-from workbench.report.text import error_fraction, escape_markdown, percent
+from workbench.report.text import error_fraction, escape_markdown, percent, torque_label
 from workbench.report.verdict_section import verdict
 
 JOINTS = ("q1", "q2", "q3")
@@ -356,7 +356,7 @@ def test_every_number_of_the_summary_stands_in_its_case_table(run: Path) -> None
     rows = summary(run)
     assert len(rows) == 30
     for row in rows:
-        key = [row["joint"], row["candidate"], row["reference"]]
+        key = [torque_label(row["joint"], row["unit"]), row["candidate"], row["reference"]]
         shown = [r for r in tables[f"case-{row['case']}-{row['kind']}"] if r[:3] == key]
         assert len(shown) == 1
         number = error_fraction if row["kind"] == "verification" else percent

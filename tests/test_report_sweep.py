@@ -175,7 +175,7 @@ def test_the_worst_designs_come_first_with_all_their_numbers(run: Path) -> None:
     found = lumped(run).sort_values("error", ascending=False)
     table = parse(run).tables["worst-1"]
     assert [row[0] for row in table[1:]] == found.case.iloc[:10].tolist()
-    assert table[0] == ["Case", "q1", "q2", "q3", "m2 [factor]", "payload [kg]", "speed [factor]"]
+    assert table[0] == ["Case", "τ1 [N]", "τ2 [N·m]", "τ3 [N·m]", "m2 [factor]", "payload [kg]", "speed [factor]"]
     for row, design in zip(table[1:], found.itertuples(), strict=False):
         assert max(row[1:4], key=lambda text: float(text.split()[0])) == percent(design.error)
     for row, value in zip(table[1:], found[KEYS[1]], strict=False):
