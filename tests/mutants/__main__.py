@@ -56,11 +56,12 @@ def main() -> int:
     tree.renew()
     trial.warm()
     given = options.tests or options.short
-    if options.reach or not (REACHED.exists() or given):
-        _reach(options.tests or modules.core_test_files(), REACHED)
     chosen = list(_chosen(options))
-    kernels = any(modules.is_kernel(planted.module) for planted in chosen)
-    if options.reach_kernels or (kernels and not (INTERPRETED.exists() or given)):
+    touched = {planted.module for planted in chosen}
+    if options.reach or not (given or _is_current(REACHED, touched)):
+        _reach(options.tests or modules.core_test_files(), REACHED)
+    kernels = {module for module in touched if modules.is_kernel(module)}
+    if options.reach_kernels or (kernels and not (given or _is_current(INTERPRETED, kernels))):
         _reach([modules.test_file(name) for name in modules.INTERPRETED_TESTS], INTERPRETED)
     known = {entry["key"]: entry for entry in _results()}
     for number, planted in enumerate(chosen, 1):
@@ -136,6 +137,18 @@ def _list(options: argparse.Namespace) -> int:
     return 0
 
 
+def _text_of(module: str) -> str:
+    return hashlib.sha256(tree.source_of(module).encode()).hexdigest()[:16]
+
+
+def _is_current(place: Path, touched: set[str]) -> bool:
+    """Whether it is known who reaches which lines of these modules as they are now: lines move with every edit."""
+    if not place.exists():
+        return False
+    texts = json.loads(place.read_text(encoding="utf-8")).get("texts", {})
+    return all(texts.get(module) == _text_of(module) for module in touched)
+
+
 def _reach(files: list[str], place: Path) -> None:
     """Run tests without a fault; what is known of other test files is kept."""
     print(f"running {len(files)} test files without a fault", flush=True)
@@ -146,9 +159,13 @@ def _reach(files: list[str], place: Path) -> None:
     if not out.exists():
         sys.exit(f"mutants: the tests did not run: {outcome}; see {PLACE / 'last.log'}")
     new = json.loads(out.read_text(encoding="utf-8"))
+    new["texts"] = {module: _text_of(module) for group in modules.GROUPS for module in modules.files_of(group)}
     old = json.loads(place.read_text(encoding="utf-8")) if place.exists() else {"lines": {}, "durations": {}}
+    texts = old.get("texts", {})
     ran = tuple(f"{name}::" for name in files)
     for module, lines in old["lines"].items():
+        if texts.get(module) != new["texts"].get(module):
+            continue
         mine = new["lines"].setdefault(module, {})
         for line, tests in lines.items():
             kept = [test for test in tests if not test.startswith(ran)]
