@@ -114,7 +114,7 @@ def _announce() -> None:
             self.said = True
             place = getattr(getattr(dispatcher, "_cache", None), "cache_path", None)
             kept = f"kept in {place}" if place else "not kept: no writable cache directory; set NUMBA_CACHE_DIR"
-            tell(f"compiling numerical kernels for this machine, once; takes some seconds ({kept})")
+            tell(f"compiling numerical kernels for this machine, once; takes half a minute or more ({kept})")
 
         def on_end(self, event: Any) -> None:
             pass
