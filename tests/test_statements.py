@@ -191,7 +191,7 @@ def test_claims_sources_and_rows_follow_the_robot(workbench: Workbench, tmp_path
     assert (change["name"], change["after"], change["by"], change["cases"]) == ("m3", 0.9, "--set", ["first"])
     assert "1 not about this robot" in out
     assert "--set: m3" in out
-    assert (tmp_path / "run/summary.csv").read_text().splitlines()[1].endswith(",changed")
+    assert (tmp_path / "run/summary.csv").read_text().splitlines()[1].endswith(",changed,")
     build_report(tmp_path / "run")
     for name in ("report.html", "report.md"):
         text = (tmp_path / "run" / name).read_text()
@@ -388,7 +388,7 @@ def test_a_change_of_all_cases_is_compared_once() -> None:
     old = manifest_of({name: {"a1": 0.21} for name in names}, values={"a1_left": 0.21, "a1_right": 0.21})
     limbs = {"a1_left": 0.23, "a1_right": 0.23}
     new = manifest_of(dict.fromkeys(names, limbs), values=limbs)
-    assert list(parameter_changes(old, new)) == [("a1_left, a1_right", 0.21, 0.23)]
+    assert list(parameter_changes(old, new)) == [ParameterChange(("a1_left", "a1_right"), 0.21, 0.23)]
     assert list(parameter_changes(old, old)) == []
     # runs that say what was changed: one case apart
     plain = manifest_of({name: {} for name in names}, **changed())

@@ -49,7 +49,7 @@ def draw(plots: Sequence[Plot], show: Show | None = None, *, second: bool = Fals
 
 def can_fork() -> bool:
     """Whether a copy of this process can be made that shares its data: on Linux, with a second core."""
-    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1
+    return sys.platform == "linux" and hasattr(os, "sched_getaffinity") and len(os.sched_getaffinity(0)) > 1
 
 
 def _take(sent: Connection | None, plots: Sequence[Plot], drawn: set[int]) -> None:
