@@ -14,6 +14,14 @@ from workbench.output_file import refuse_target
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="links, pipes and devices are POSIX")
 
 
+def as_it_is(path: Path) -> object:
+    """What a file is, without when it was last looked at."""
+    if not os.path.lexists(path):
+        return None
+    found = os.lstat(path)
+    return found.st_mode, found.st_ino, found.st_size, found.st_mtime_ns, found.st_nlink
+
+
 def lay(place: Path, kind: str) -> Path:
     path = place / "x.json"
     other = place / "other"
@@ -64,8 +72,8 @@ def test_diagnose_refuses_its_files_before_it_looks_at_a_formula(
     workbench = Workbench(tmp_path, monkeypatch, capsys)
     workbench.write(SMALL)
     path = lay(tmp_path, kind)
-    before = os.path.lexists(path) and os.lstat(path)
+    before = as_it_is(path)
     done = workbench("diagnose", "small.toml", option, os.fspath(path))
     assert (done.code, done.out) == (2, "")
     assert SAID[kind] in done.complaint[0]
-    assert (os.path.lexists(path) and os.lstat(path)) == before
+    assert as_it_is(path) == before

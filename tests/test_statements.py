@@ -18,7 +18,7 @@ from workbench.campaign.changed import Change, sentences
 from workbench.campaign.conclusion import EXIT_CODES, CaseOutcome, case_status, conclude, conclude_sweep
 from workbench.campaign.evidence import Effort
 from workbench.campaign.replacing import lost_evidence, refuse_loss, request_of
-from workbench.compare.parameters import parameter_changes
+from workbench.compare.parameters import ParameterChange, parameter_changes
 from workbench.errors import OutputError
 from workbench.report import build_report
 from workbench.report.manifest import Manifest
@@ -393,7 +393,9 @@ def test_a_change_of_all_cases_is_compared_once() -> None:
     # runs that say what was changed: one case apart
     plain = manifest_of({name: {} for name in names}, **changed())
     apart = manifest_of({name: {} for name in names}, **changed(("m3", 0.5, 0.9, ["c7"])))
-    assert list(parameter_changes(plain, apart)) == [("m3 in c7", 0.5, 0.9)]
+    (one,) = parameter_changes(plain, apart)
+    assert (one.names, one.before, one.after) == (("m3",), 0.5, 0.9)
+    assert "c7" in one.where
 
 
 @pytest.mark.parametrize(
