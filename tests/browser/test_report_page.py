@@ -96,7 +96,7 @@ def test_nothing_is_asked_for_and_every_figure_is_seen(chromium: Any, page_file:
         for index in range(drawings.count()):
             box = drawings.nth(index).bounding_box()
             assert box["width"] > 200
-            assert box["height"] > 120
+            assert box["height"] > 90  # two cases at a glance are a flat figure
         colours = page.evaluate("""() => {
             const of = (element, name) => getComputedStyle(element).getPropertyValue(name);
             return [of(document.body, "background-color"), of(document.body, "color"),
