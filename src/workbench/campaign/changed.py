@@ -60,10 +60,10 @@ def said_of(change: Any, by: bool = True) -> str:
     return f"{change.name} {before} -> {after}{unit}{f' ({change.by})' if by else ''}"
 
 
-def few(said: Sequence[str]) -> str:
+def few(said: Sequence[str], most: int = SHOWN) -> str:
     """Join names, the first of them where they are many."""
-    more = f" and {len(said) - SHOWN} more" if len(said) > SHOWN else ""
-    return ", ".join(said[:SHOWN]) + more
+    more = f" and {len(said) - most} more" if len(said) > most else ""
+    return ", ".join(said[:most]) + more
 
 
 def not_known(cases: Sequence[str]) -> str:

@@ -105,12 +105,13 @@ def worst_over_cases(found: Sequence[Asked]) -> Iterator[Worst]:
     for one in found:
         groups.setdefault((one.item, one.key), []).append(one)
     for (item, key), members in groups.items():
-        before = max(members, key=lambda one: _size(one.before))
-        after = max(members, key=lambda one: _size(one.after))
+        before = max(members, key=lambda one: size_of(one.before))
+        after = max(members, key=lambda one: size_of(one.after))
         yield Worst(item, key, members[0].unit, before.before, before.case, after.after, after.case)
 
 
-def _size(value: float | None) -> float:
+def size_of(value: float | None) -> float:
+    """Order of figures: what no run has is least, what is no number largest."""
     return -math.inf if value is None else math.inf if math.isnan(value) else value
 
 

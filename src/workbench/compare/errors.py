@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from workbench.campaign.good import Measured
 from workbench.campaign.verdict import FAILURES, MODELLING, UNBOUNDED, VERIFICATION
 from workbench.errors import WorkbenchError
 
@@ -22,23 +23,11 @@ JUDGED = (VERIFICATION, MODELLING, UNBOUNDED)
 """Kinds of rows in which a larger error is worse; declared failures and contrasts are judged by their verdict alone."""
 
 
-class Measured(Protocol):
-    """A row of errors, computed just now or read from ``summary.csv``."""
+class Compared(Measured, Protocol):
+    """A row of errors with its verdict."""
 
     @property
-    def case(self) -> str: ...  # noqa: D102
-    @property
-    def candidate(self) -> str: ...  # noqa: D102
-    @property
-    def reference(self) -> str: ...  # noqa: D102
-    @property
-    def joint(self) -> str: ...  # noqa: D102
-    @property
-    def kind(self) -> str: ...  # noqa: D102
-    @property
     def verdict(self) -> str: ...  # noqa: D102
-    @property
-    def peak_error(self) -> float: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -50,8 +39,8 @@ class ErrorChange:
     reference: str
     joint: str
     kind: str
-    before: Measured | None
-    after: Measured | None
+    before: Compared | None
+    after: Compared | None
 
     @property
     def where(self) -> str:
@@ -80,7 +69,7 @@ class ErrorChange:
         return lines
 
 
-def _value(row: Measured, measure: str) -> float:
+def _value(row: Compared, measure: str) -> float:
     return float(getattr(row, measure))
 
 
@@ -102,7 +91,7 @@ def growth_text(factor: float) -> str:
     return f"{sign}{size:.0e}" if size >= 1000 else f"{sign}{size:.2f}" if size < 10 else f"{sign}{size:.0f}"
 
 
-def match_errors(before: Iterable[Measured], after: Iterable[Measured]) -> list[ErrorChange]:
+def match_errors(before: Iterable[Compared], after: Iterable[Compared]) -> list[ErrorChange]:
     """Pair the rows of two runs, in the order of the second; those that only the first has come last."""
     old, new = {_key(row): row for row in before}, {_key(row): row for row in after}
     # what kind a row is may be told otherwise by another version, or by a bound that came or went
@@ -110,7 +99,7 @@ def match_errors(before: Iterable[Measured], after: Iterable[Measured]) -> list[
     return [ErrorChange(*key, (new.get(key) or old[key]).kind, old.get(key), new.get(key)) for key in keys]
 
 
-def _key(row: Measured) -> tuple[str, str, str, str]:
+def _key(row: Compared) -> tuple[str, str, str, str]:
     return row.case, row.candidate, row.reference, row.joint
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from workbench.campaign.changed import not_shared
 from workbench.campaign.margins import answer, worst_of
 from workbench.campaign.verdict import WITHOUT_BOUND
-from workbench.compare.asked import WORDS, Asked, shared_cases, worst_over_cases
+from workbench.compare.asked import WORDS, Asked, shared_cases, size_of, worst_over_cases
 from workbench.compare.errors import FLOOR, ErrorChange, growth, growth_text
 from workbench.compare.parameters import ParameterChange, parameter_changes
 from workbench.compare.plots import case_plots
@@ -17,7 +17,7 @@ from workbench.compare.runs import Difference, RunComparison
 from workbench.report.actuator_section import BESIDE, margin_status
 from workbench.report.load import Run
 from workbench.report.plot import Plot
-from workbench.report.section import Section
+from workbench.report.section import Section, plain_section
 from workbench.report.sections import unique_keys
 from workbench.report.tables import Cell, Table, columns, verdict_status
 from workbench.report.text import exact, percent, pretty_unit, scientific, with_unit
@@ -55,12 +55,8 @@ def comparison_sections(old: Run, new: Run, found: RunComparison, floor: float =
     return [section for section in sections if section is not None]
 
 
-def _section(
-    key: str, title: str, paragraphs: Sequence[str], tables: Sequence[Table], template: str = "sweep"
-) -> Section:
-    shown = [table for table in tables if table.rows]
-    context = {"paragraphs": list(paragraphs), "tables": shown, "figures": (), "note": ""}
-    return Section(key, title, template, context)
+def _section(key: str, title: str, paragraphs: Sequence[str], tables: Sequence[Table]) -> Section:
+    return plain_section(key, title, paragraphs, [table for table in tables if table.rows])
 
 
 def changed_section(old: Run, new: Run, found: RunComparison) -> Section:
@@ -204,7 +200,7 @@ def in_short(found: RunComparison) -> list[str]:
         parts = [f"{one.item} {ratio_text(one.ratio)}" for one in worst if one.key == key]
         said += [f"{WORDS[key]} {', '.join(parts)}"] if parts else []
     lines = [f"B over A, the largest over the cases of both: {'; '.join(said)}."] if said else []
-    most = max(worst_over_cases(found.reactions), key=lambda one: _size(one.after), default=None)
+    most = max(worst_over_cases(found.reactions), key=lambda one: size_of(one.after), default=None)
     if most is not None:
         lines.append(
             f"The largest reaction of B is {exact(most.after)} N at {most.item} in case {most.after_in}; in A the same"
@@ -246,7 +242,7 @@ def reactions_section(found: RunComparison) -> Section | None:
     """Say what the joints bear."""
     if not found.reactions:
         return None
-    worst = sorted(worst_over_cases(found.reactions), key=lambda one: -_size(one.after))
+    worst = sorted(worst_over_cases(found.reactions), key=lambda one: -size_of(one.after))
     rest = len(worst) - WORST_REACTIONS
     table = Table(
         "reactions",
@@ -267,10 +263,6 @@ def reactions_section(found: RunComparison) -> Section | None:
         + (f" The other {rest} are smaller." if rest > 0 else ""),
     )
     return _section("reactions", "What the joints bear", [], [table])
-
-
-def _size(value: float | None) -> float:
-    return -math.inf if value is None else math.inf if math.isnan(value) else value
 
 
 def errors_section(found: RunComparison, floor: float) -> Section:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import combinations_with_replacement
 
 from workbench.diagnosis.edits import INSERT, SHAPES, Edit
@@ -64,11 +64,11 @@ class _Inserts:
                 yield Edit(start, start, f"{factor} * ", INSERT, line)
                 yield Edit(end, end, f" / {factor}", INSERT, line)
 
-    def _texts(self, values: Iterator[ast.expr], wanted: object) -> list[str]:
+    def _texts(self, values: Iterator[ast.expr], wanted: Callable[[ast.expr], bool]) -> list[str]:
         found: dict[str, None] = {}
         for value in values:
             for node in ast.walk(value):
-                if isinstance(node, ast.expr) and callable(wanted) and wanted(node):
+                if isinstance(node, ast.expr) and wanted(node):
                     text = self._places.text(self._places.start(node), self._places.end(node))
                     if len(text) <= LONGEST and "\n" not in text:
                         found.setdefault(text)

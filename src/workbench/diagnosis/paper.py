@@ -12,7 +12,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.diagnosis.examine import Examined
 from workbench.diagnosis.noise import SAFETY
-from workbench.diagnosis.parts import REST, Part, design, take_apart
+from workbench.diagnosis.parts import REST, design, take_apart
 from workbench.diagnosis.probes import Plan
 from workbench.diagnosis.shares import reference_torques
 from workbench.diagnosis.subject import AFFINE, Parameter, Subject
@@ -73,7 +73,7 @@ def splitting_of(plan: Plan, with_force: bool) -> FloatArray:
     for probe in range(probes):
         tau = np.zeros((probes, 1, len(plan.rates)))
         tau[probe] = 1.0
-        parts = {part: values for part, values in _linear(one, tau, with_force).items() if part.kind != REST}
+        parts = {part: values for part, values in take_apart(one, tau, with_force).items() if part.kind != REST}
         columns.append([float(values[0, 0]) for values in parts.values()])
     matrix = np.array(columns).T
     known = [part for part in parts if part.kind != "odd"]
@@ -85,11 +85,6 @@ def splitting_of(plan: Plan, with_force: bool) -> FloatArray:
             row[index] += 1.0
             mixed.append(row)
     return np.vstack([matrix, *mixed])
-
-
-def _linear(plan: Plan, tau: FloatArray, with_force: bool) -> dict[Part, FloatArray]:
-    """`take_apart` of unit answers; its choice of the larger of two odd parts is taken back to their sum."""
-    return take_apart(plan, tau, with_force)
 
 
 def groups_of(parameters: Sequence[Parameter]) -> dict[str, list[str]]:

@@ -153,11 +153,16 @@ class _Changed:
                 if step.start <= edit.start and edit.end <= step.end:
                     lines = data[step.start : edit.start] + edit.new.encode() + data[edit.end : step.end]
                     return number, compiled_statement(lines, self._tape._path), None
-        home = self._home
+        return 0, None, self._function()
+
+    def _function(self) -> Callable[..., Any]:
+        """The whole function, edited."""
+        home, edit, data = self._home, self._edit, self._tape._data
         text = data[home.start : edit.start] + edit.new.encode() + data[edit.end : home.end]
         made: Space = {}
         exec(compile(ast.parse(text), self._tape._path, "exec"), self._tape._globals, made)
-        return 0, None, made[home.name]
+        found: Callable[..., Any] = made[home.name]
+        return found
 
     def wrapper(self, function: Function, plain: Callable[..., Any]) -> Callable[..., Any]:
         name, program = function.name, function.program
@@ -182,12 +187,7 @@ class _Changed:
 
     def _compiled_whole(self) -> Callable[..., Any]:
         if self._whole is None:
-            home, edit, data = self._home, self._edit, self._tape._data
-            text = data[home.start : edit.start] + edit.new.encode() + data[edit.end : home.end]
-            made: Space = {}
-            exec(compile(ast.parse(text), self._tape._path, "exec"), self._tape._globals, made)
-            self._whole = made[home.name]
-        assert self._whole is not None
+            self._whole = self._function()
         return self._whole
 
     def _replayed(self, program: Program, trace: Trace, mine: bool) -> Any:

@@ -14,7 +14,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.compiled import compiled, merged
-from workbench.reference.kernels import integrate, keep_if_better
+from workbench.reference.kernels import follow_tangent, integrate, keep_if_better
 from workbench.reference.kinematics import Kinematics, Places, place, room
 from workbench.reference.linear import factor, solved
 from workbench.reference.rows import constraint_rows
@@ -147,6 +147,17 @@ def _noted(passive, actuated, a, order, found, x, tangent, facts):  # type: igno
         facts[3] = passive[order[min(found, p - 1)]]
 
 
+@merged
+def _rows(mechanism, w, qpos, jacobian):  # type: ignore[no-untyped-def]
+    """Evaluate the loops of one configuration: *jacobian* ``(m, nv)``, and their residual in ``Bench.residual``."""
+    kin, seen = mechanism.kinematics, w.seen
+    place(kin, qpos, w.places)
+    constraint_rows(
+        mechanism.closures, mechanism.joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat,
+        seen.anchors, jacobian, w.residual,
+    )  # fmt: skip
+
+
 @compiled
 def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     """Newton on the passive joints from `Bench.qpos`, which is overwritten.
@@ -154,18 +165,13 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     The best configuration met goes to `Bench.kept`, its residual to `Bench.facts`; where it is closed, also tangent,
     rank, condition and weakest freedom.
     """
-    kin, closures, joints, seen = mechanism.kinematics, mechanism.closures, mechanism.joints, w.seen
     passive, actuated, qpos, step, x = mechanism.passive, mechanism.actuated, w.qpos, w.step, w.x
     limits = (rules.closed, rules.floor, rules.astray, rules.settles)
     w.best[0] = math.inf
     w.sides[0] = UNKNOWN
     w.facts[1], w.facts[2], w.facts[3] = 0.0, math.inf, 0.0
     for _ in range(rules.steps):
-        place(kin, qpos, w.places)
-        constraint_rows(
-            closures, joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat, seen.anchors, w.jacobian,
-            w.residual,
-        )  # fmt: skip
+        _rows(mechanism, w, qpos, w.jacobian)
         again, good = keep_if_better(w.residual, limits, qpos, w.kept, w.best, 0)
         if not (again or good):
             break
@@ -181,17 +187,8 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
             step[actuated[j]] = 0.0
         for j in range(passive.shape[0]):
             step[passive[j]] = x[j]
-        integrate(qpos, step, joints, qpos)
+        integrate(qpos, step, mechanism.joints, qpos)
     w.facts[0] = w.best[0]
-
-
-@merged
-def _along(tangent, rates, out):  # type: ignore[no-untyped-def]
-    for d in range(tangent.shape[0]):
-        value = 0.0
-        for j in range(tangent.shape[1]):
-            value += tangent[d, j] * rates[j]
-        out[d] = value
 
 
 @merged
@@ -229,14 +226,9 @@ def _on_side(mechanism, w):  # type: ignore[no-untyped-def]
         return before == UNKNOWN or before == w.sides[0]
     if (before == after and after != UNKNOWN) or w.facts[1] < table.columns.shape[0]:
         return True
-    kin, seen = mechanism.kinematics, w.seen
     for second in range(2):
         qpos, rows = (w.kept, w.after[0]) if second else (w.here, w.before[0])
-        place(kin, qpos, w.places)
-        constraint_rows(
-            mechanism.closures, mechanism.joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat,
-            seen.anchors, rows, w.residual,
-        )  # fmt: skip
+        _rows(mechanism, w, qpos, rows)
     same_side(w.before, w.after, table, w.work, w.same)
     return w.same[0]
 
@@ -253,14 +245,14 @@ def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
         way[j] = target[j] - origin[j]
     done, step = 0.0, 1.0
     while done < 1.0:
-        _along(w.tangent_here, way, w.step)
+        follow_tangent(w.tangent_here, way, w.step)
         longest = rules.almost * rules.longest / _length(w.step, mechanism.weights)
         part = min(step, 1.0 - done, longest)
         last = done + part >= 1.0
         for j in range(na):
             aim[j] = target[j] if last else origin[j] + way[j] * (done + part)
             change[j] = way[j] * part
-        _along(w.tangent_here, change, w.step)
+        follow_tangent(w.tangent_here, change, w.step)
         moved = _length(w.step, mechanism.weights)
         integrate(w.here, w.step, mechanism.joints, w.predicted)
         if part == 1.0:

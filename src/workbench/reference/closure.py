@@ -13,7 +13,7 @@ from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
 from workbench.reference.along import OrderedClosure
 from workbench.reference.closing import LINES, NEAR, Mechanism, advance, bench
-from workbench.reference.continuation import ASTRAY, NEWTON_STEPS, SMALLEST_STEP, Assembly
+from workbench.reference.continuation import NEWTON_STEPS, SMALLEST_STEP, Assembly
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import integrate, newton_step
 from workbench.reference.kinds import JOINT, TENDON
@@ -175,9 +175,7 @@ class LoopCloser(OrderedClosure):
             return found
         qpos = evaluator.qpos
         qpos[:count] = start
-        # the floor: a closed sample gets one more step, which takes it to rounding; then it stays
-        tolerance = self.tolerance
-        limits = (tolerance.residual, tolerance.floor, ASTRAY * tolerance.size, tolerance.few_digits)
+        limits = self.limits
         active = np.arange(count)
         for _ in range(NEWTON_STEPS):
             poses = evaluator.place(active)

@@ -249,13 +249,18 @@ class Continuation(ABC):
             active = active[done[active] < 1.0]
         return here, done >= 1.0
 
+    @property
+    def limits(self) -> tuple[float, float, float, bool]:
+        """Residuals between which Newton goes on, as the kernels take them.
+
+        The floor: a closed sample gets one more step, which takes it to rounding; then it stays.
+        """
+        tolerance = self.tolerance
+        return tolerance.residual, tolerance.floor, ASTRAY * tolerance.size, tolerance.few_digits
+
     def rules(self, smallest: float = SMALLEST_STEP) -> Rules:
         """The bounds above as the kernels take them."""
-        tolerance = self.tolerance
-        return Rules(
-            tolerance.residual, tolerance.floor, ASTRAY * tolerance.size, tolerance.few_digits, NEWTON_STEPS,
-            CORRECTION, LONGEST_STEP, ALMOST, NEGLIGIBLE, smallest,
-        )  # fmt: skip
+        return Rules(*self.limits, NEWTON_STEPS, CORRECTION, LONGEST_STEP, ALMOST, NEGLIGIBLE, smallest)
 
     def _predict(self, here: Assembly, rows: np.ndarray, change: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Tangent predictor: distance moved by a change of the given coordinates, and where that leads."""

@@ -54,7 +54,7 @@ def predict(start, tangent, change, joints, weights, out, moved):  # type: ignor
     """
     step = np.empty(tangent.shape[1])
     for s in range(start.shape[0]):
-        _along(tangent[s], change[s], step)
+        follow_tangent(tangent[s], change[s], step)
         squared = 0.0
         for d in range(step.shape[0]):
             squared += (step[d] * weights[d]) ** 2
@@ -63,7 +63,7 @@ def predict(start, tangent, change, joints, weights, out, moved):  # type: ignor
 
 
 @inlined
-def _along(tangent, rates, velocity):  # type: ignore[no-untyped-def]
+def follow_tangent(tangent, rates, velocity):  # type: ignore[no-untyped-def]
     """Fill velocity ``(nv,)`` = tangent rates."""
     for d in range(tangent.shape[0]):
         value = 0.0
@@ -76,7 +76,7 @@ def _along(tangent, rates, velocity):  # type: ignore[no-untyped-def]
 def velocities(tangent, qd, qvel):  # type: ignore[no-untyped-def]
     """Fill full velocities ``(n, nv)`` from actuated ones ``(n, na)``."""
     for s in range(tangent.shape[0]):
-        _along(tangent[s], qd[s], qvel[s])
+        follow_tangent(tangent[s], qd[s], qvel[s])
 
 
 @inlined
@@ -199,7 +199,7 @@ def projection(  # type: ignore[no-untyped-def]
             worst = math.inf if math.isnan(value) else max(worst, abs(value))
             open_by = math.inf if math.isnan(res[i]) else max(open_by, abs(res[i]))
         closure_residual[s], velocity_residual[s] = open_by, worst
-        _along(tangent[s], qdd[s], qacc[s])
+        follow_tangent(tangent[s], qdd[s], qacc[s])
         body_motion(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], v, acc)
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
         for i in range(m):

@@ -14,7 +14,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError, ParameterError
 from workbench.reference.closure import LoopCloser, loop_rows
-from workbench.reference.continuation import ASTRAY, NEWTON_STEPS, Assembly, Continuation
+from workbench.reference.continuation import NEWTON_STEPS, Assembly, Continuation
 from workbench.reference.engine import Evaluator
 from workbench.reference.platform_kernels import platform_accelerations, platform_jacobian, platform_newton
 from workbench.reference.sides import pattern_of
@@ -168,8 +168,7 @@ class PlatformCloser(Continuation):
         found = self._nothing(count, aim.shape[1])
         qpos = evaluator.qpos
         qpos[:count] = start
-        tolerance = self.tolerance
-        limits = (tolerance.residual, tolerance.floor, ASTRAY * tolerance.size, tolerance.few_digits)
+        limits = self.limits
         active = np.arange(count)
         for _ in range(NEWTON_STEPS):
             poses = evaluator.place(active)

@@ -8,7 +8,7 @@ from workbench.campaign.margins import Margin, answer, shortfalls, worst_of
 from workbench.report.attention import margins_of, unknown_cases
 from workbench.report.load import Run
 from workbench.report.manifest import Manifest
-from workbench.report.section import Section
+from workbench.report.section import Section, plain_section
 from workbench.report.tables import Cell, Status, Table, columns
 from workbench.report.text import exact, pretty_unit, with_unit
 
@@ -34,8 +34,7 @@ def actuator_section(run: Run, anchors: Mapping[str, str]) -> Section | None:
         *([limits_table(found, anchors)] if found else []),
         demand_table(run.manifest, anchors),
     ]
-    context = {"paragraphs": paragraphs, "tables": tables, "figures": (), "note": ""}
-    return Section("actuators", "What the actuators have to give", "sweep", context)
+    return plain_section("actuators", "What the actuators have to give", paragraphs, tables)
 
 
 NO_LIMITS = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from workbench.campaign.changed import few
 from workbench.report.case_section import joint_heading
 from workbench.report.load import Run
 from workbench.report.tables import FAILURES, NOT_COMPUTED
@@ -27,10 +28,10 @@ def compared(run: Run) -> str:
     manifest = run.manifest
     contrasts = {row.candidate for row in run.rows if row.kind == "contrast"}
     names = [name for name in manifest.candidates if name not in contrasts]
-    few = ", ".join(names) if len(names) <= 6 else f"{', '.join(names[:5])} and {len(names) - 5} more"
+    listed = few(names, len(names) if len(names) <= 6 else 5)
     joints = ", ".join(joint_heading(run, joint) for joint in manifest.joints)
     samples = sum(record.samples or 0 for record in manifest.cases.values())
-    formulas = f"{len(names)} formula{'s' if len(names) != 1 else ''} ({few})" if names else "No formula"
+    formulas = f"{len(names)} formula{'s' if len(names) != 1 else ''} ({listed})" if names else "No formula"
     cases = f"{len(manifest.cases)} case{'s' if len(manifest.cases) != 1 else ''}"
     return f"{formulas} against MuJoCo's inverse dynamics of the model, on {joints}, in {cases}, {samples} samples."
 
@@ -78,8 +79,7 @@ def _warned(run: Run, anchors: Mapping[str, str]) -> list[Point]:
     warned = [name for name, record in run.manifest.cases.items() if record.warnings]
     if not warned:
         return []
-    names = ", ".join(warned[:MOST_ROWS]) + (f" and {len(warned) - MOST_ROWS} more" if len(warned) > MOST_ROWS else "")
-    return [Point(f"warnings stand with {names}", anchors[warned[0]])]
+    return [Point(f"warnings stand with {few(warned, MOST_ROWS)}", anchors[warned[0]])]
 
 
 def _claims(run: Run) -> list[Point]:

@@ -8,7 +8,7 @@ from workbench.campaign.good import NO, UNDECIDED, YES, answers, good_enough
 from workbench.report.attention import unknown_cases
 from workbench.report.case_section import joint_heading
 from workbench.report.load import ErrorRow, Run
-from workbench.report.section import Section
+from workbench.report.section import Section, plain_section
 from workbench.report.tables import Cell, Status, Table, columns
 from workbench.report.text import percent
 
@@ -29,8 +29,7 @@ def good_section(run: Run, anchors: Mapping[str, str]) -> Section | None:
     found = answers(run.rows, good, unknown_cases(run.manifest))
     sentences = [answer.sentence for answer in found] or ["No formula without a bound was computed."]
     tables = [good_table(run, good, anchors)] if found else []
-    context = {"paragraphs": sentences, "tables": tables, "figures": (), "note": ""}
-    return Section("good", "Is it good enough", "sweep", context)
+    return plain_section("good", "Is it good enough", sentences, tables)
 
 
 def good_table(run: Run, good: float, anchors: Mapping[str, str]) -> Table:

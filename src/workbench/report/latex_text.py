@@ -18,6 +18,8 @@ _SIGN = re.compile("|".join(sorted(map(re.escape, _SPECIAL), key=len, reverse=Tr
 POWER = re.compile(r"(?<![\w.])(-?\d(?:\.\d+)?)e([+-]\d{2,3})(?!\w)")
 _SCRIPTED = re.compile(r"(?<![A-Za-z0-9_])τ(?:_([a-z]+)|(\d+))")
 _KEY = re.compile(r"\[([A-Za-z][A-Za-z0-9]*)\]")
+_WRITTEN = re.compile("|".join(f"(?:{one.pattern})" for one in (POWER, _SCRIPTED, _KEY)))
+"""What is written otherwise than letter by letter."""
 
 LONG_WORD = 16
 """Letters from which on a word without a hyphen may be broken, after every `EVERY`."""
@@ -41,9 +43,8 @@ def latex_text(text: str, keys: Collection[str] = (), breaks: bool = False) -> s
 
 
 def _pieces(plain: str, keys: Collection[str], breaks: bool) -> Iterator[str]:
-    patterns = re.compile("|".join(f"(?:{one.pattern})" for one in (POWER, _SCRIPTED, _KEY)))
     start = 0
-    for match in patterns.finditer(plain):
+    for match in _WRITTEN.finditer(plain):
         power, scripted, key = (one.fullmatch(match[0]) for one in (POWER, _SCRIPTED, _KEY))
         if key and key[1] not in keys:
             continue

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from workbench.report.plot import Plot
+from workbench.report.tables import Table
 
 SHORT = {
     "The papers' claims": "Claims",
@@ -42,3 +43,9 @@ class Section:
     def short(self) -> str:
         """The title in the list of contents."""
         return SHORT.get(self.title, self.title)
+
+
+def plain_section(key: str, title: str, paragraphs: Sequence[str], tables: Sequence[Table]) -> Section:
+    """Return a section of sentences and the tables that hold them up."""
+    context = {"paragraphs": list(paragraphs), "tables": list(tables), "figures": (), "note": ""}
+    return Section(key, title, "sweep", context)
