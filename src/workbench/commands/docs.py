@@ -9,7 +9,7 @@ import typer
 
 def docs(
     name: Annotated[
-        str, typer.Argument(metavar="[NAME]", help="As it is cited: docs/evidence.md, or evidence. Without: the list.")
+        str, typer.Argument(metavar="NAME", help="As it is cited: docs/evidence.md, or evidence. Without: the list.")
     ] = "",
 ) -> None:
     """Print a document that a report cites: evidence, derivations, conventions."""
