@@ -36,7 +36,7 @@ def _lines(command: Any, path: str, level: int) -> Iterator[str]:
     yield f"```text\n{path} {' '.join(command.collect_usage_pieces(context))}\n```\n"
     records = [record for parameter in command.get_params(context) if (record := parameter.get_help_record(context))]
     if records:
-        yield "| | |\n|---|---|"
+        yield "| argument, option | meaning |\n|---|---|"
         yield from (f"| {_code(name)} | {_cell(_plain(text))} |" for name, text in records)
         yield ""
     for name in command.list_commands(context) if hasattr(command, "list_commands") else ():

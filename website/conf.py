@@ -45,5 +45,5 @@ napoleon_use_rtype = False
 
 copybutton_prompt_text = "$ "
 copybutton_exclude = ".linenos, .gp, .go"
-# Blocks of files that pages show have the file's name behind their language; diffs of commands hold what no lexer knows.
+# Examples leave things out (...), which no lexer knows.
 suppress_warnings = ["misc.highlighting_failure"]

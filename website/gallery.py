@@ -29,7 +29,8 @@ def _card(path: Path, repository: Path) -> str:
     folder = path.parent.relative_to(repository).as_posix()
     about = re.sub(r"^Error report of the campaign \*\*\w+\*\*\. ", "", about)
     return (
-        f'<a class="card" href="{folder}/report.html"><img src="{folder}/{_picture(path.parent)}" alt="" loading="lazy">'
+        f'<a class="card" href="{folder}/report.html">'
+        f'<img src="{folder}/{_picture(path.parent)}" alt="" loading="lazy">'
         f"<strong>{html.escape(title)}</strong><span>{html.escape(about)}</span><em>{html.escape(said)}</em></a>"
     )
 

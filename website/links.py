@@ -1,4 +1,4 @@
-"""What is wrong with the links of a built site: targets that are not there, and anything that a page would fetch from elsewhere."""
+"""What is wrong with a built site's links: targets that are not there, and what a page would fetch from elsewhere."""
 
 from __future__ import annotations
 
@@ -8,7 +8,15 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-FETCHES = {("link", "href"), ("script", "src"), ("img", "src"), ("iframe", "src"), ("source", "src"), ("video", "src"), ("object", "data")}
+FETCHES = {
+    ("link", "href"),
+    ("script", "src"),
+    ("img", "src"),
+    ("iframe", "src"),
+    ("source", "src"),
+    ("video", "src"),
+    ("object", "data"),
+}
 """Attributes whose target a browser loads by itself."""
 
 STYLE_URL = re.compile(r"""url\(\s*["']?(?!data:)([^"')]+)""")
@@ -35,11 +43,15 @@ class Page(HTMLParser):
 def findings(site: Path) -> list[str]:
     """Every fault, as ``page: what``; reports are pages of their own, of which only the anchors count."""
     pages = {path.resolve(): Page(path.read_text(encoding="utf-8")) for path in sorted(site.rglob("*.html"))}
-    found = [f"{path.relative_to(site.resolve())}: {what}" for path, page in pages.items() for what in _of_page(path, page, pages)]
+    found = [
+        f"{path.relative_to(site.resolve())}: {what}"
+        for path, page in pages.items()
+        for what in _of_page(path, page, pages)
+    ]
     for style in sorted(site.rglob("*.css")):
         for target in STYLE_URL.findall(style.read_text(encoding="utf-8")):
-            if urlsplit(target).netloc or not (style.parent / unquote(urlsplit(target).path)).exists():
-                found.append(f"{style.relative_to(site)}: loads {target}")
+            here = not urlsplit(target).netloc and (style.parent / unquote(urlsplit(target).path)).exists()
+            found += [] if here else [f"{style.relative_to(site)}: loads {target}"]
     return found
 
 

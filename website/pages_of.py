@@ -6,8 +6,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-ROBOT_FILE = "robot.toml"
-LEFT_OUT = ("build", "tests", "src", ".venv", ".venv-floors", "reports")
+LEFT_OUT = ("build", "docs", "reports", "src", "tests")
 """Folders without pages of their own."""
 
 
@@ -21,15 +20,15 @@ class Section:
 
 def repository_pages(repository: Path) -> tuple[str, ...]:
     """Pages that lie in the repository: documents, READMEs of folders, the project's own papers."""
-    found = sorted((repository / "docs").rglob("*.md"))
-    found += [path for path in sorted(repository.rglob("README.md")) if path.parent != repository and _wanted(path, repository)]
+    found = [*sorted((repository / "docs").rglob("*.md")), *below(repository, "README.md")]
     found += [path for path in sorted(repository.glob("*.md")) if path.name != "README.md"]
     return tuple(path.relative_to(repository).with_suffix("").as_posix() for path in found)
 
 
-def _wanted(path: Path, repository: Path) -> bool:
-    parts = path.relative_to(repository).parts
-    return parts[0] not in LEFT_OUT and not any(part.startswith(".") for part in parts)
+def below(repository: Path, name: str) -> list[Path]:
+    """Files of a name in the repository's folders that have pages, its top left out."""
+    tops = [path for path in sorted(repository.iterdir()) if path.is_dir() and path.name not in LEFT_OUT]
+    return [path for top in tops if not top.name.startswith(".") for path in sorted(top.rglob(name))]
 
 
 def sections(website: Path, pages: tuple[str, ...]) -> tuple[Section, ...]:
@@ -57,5 +56,7 @@ def _expanded(patterns: list[str], pages: tuple[str, ...]) -> tuple[str, ...]:
     found: list[str] = []
     for pattern in patterns:
         folder, star, _ = pattern.partition("*")
-        found += [page for page in pages if (page.startswith(folder) if star else page == pattern) and page not in found]
+        found += [
+            page for page in pages if (page.startswith(folder) if star else page == pattern) and page not in found
+        ]
     return tuple(found)

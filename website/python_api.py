@@ -9,8 +9,9 @@ import workbench
 
 HEAD = """# Python
 
-What `import workbench as wb` offers, from its docstrings. Arrays are float64, SI, batch first; names, units and frames are those of
-[notation](../docs/notation.md). Names that begin with an underscore, and modules that no page names, may change without notice.
+What `import workbench as wb` offers, from its docstrings. Arrays are float64, SI, batch first; names, units and frames
+are those of [notation](../docs/notation.md). Names that begin with an underscore, and modules that no page names, may
+change without notice.
 
 """
 

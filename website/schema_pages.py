@@ -23,21 +23,28 @@ from workbench.robots.robot_file import RobotSpec
 TABLE = "| key | value | where not given | meaning |\n|---|---|---|---|"
 
 
+CAMPAIGN = """# Campaign file, key by key
+
+Made from the schema that checks campaign files, so every key is here and no other.
+[Campaign files](../docs/campaign.md) explains them with examples, [sweeps](../docs/sweeps.md) the table `[sweep]`.
+
+"""
+ROBOT = """# Robot file, key by key
+
+Made from the schema that checks robot files, so every key is here and no other. [Robots](../docs/robots.md) explains
+them with examples.
+
+"""
+
+
 def campaign_page(repository: Path) -> str:
     """Give the page of the campaign file."""
-    return (
-        "# Campaign file, key by key\n\nMade from the schema that checks campaign files, so every key is here and no other."
-        " [Campaign files](../docs/campaign.md) explains them with examples, [sweeps](../docs/sweeps.md) the table `[sweep]`.\n\n"
-        + "\n".join(_tables(Campaign, {}))
-    )
+    return CAMPAIGN + "\n".join(_tables(Campaign, {}))
 
 
 def robot_page(repository: Path) -> str:
     """Give the page of the robot file."""
-    return (
-        "# Robot file, key by key\n\nMade from the schema that checks robot files, so every key is here and no other."
-        " [Robots](../docs/robots.md) explains them with examples.\n\n" + "\n".join(_tables(RobotSpec, {}))
-    )
+    return ROBOT + "\n".join(_tables(RobotSpec, {}))
 
 
 def _tables(root: type[BaseModel], seen: dict[type[BaseModel], str]) -> Iterator[str]:
@@ -53,7 +60,8 @@ def _tables(root: type[BaseModel], seen: dict[type[BaseModel], str]) -> Iterator
         yield TABLE
         meanings = field_docstrings(model)
         for name, field in model.model_fields.items():
-            yield f"| `{name}` | {_cell(_shape(field))} | {_cell(_default(field))} | {_cell(_prose(meanings.get(name, '')))} |"
+            cells = (f"`{name}`", _shape(field), _default(field), _prose(meanings.get(name, "")))
+            yield f"| {' | '.join(_cell(cell) for cell in cells)} |"
             waiting += _inner(name, field.annotation, heading.strip("[]"))
         yield ""
 
@@ -65,7 +73,7 @@ def _inner(name: str, annotation: Any, above: str) -> list[tuple[str, type[BaseM
     for model, many, named in _models(annotation, False, False):
         kind = next((kind for kind, motion in MOTIONS.items() if motion is model), "")
         heading = f"[[{path}]]" if many else f"[{path}.NAME]" if named else f"[{path}]"
-        found.append((f"{heading} kind = \"{kind}\"" if kind else heading, model))
+        found.append((f'{heading} kind = "{kind}"' if kind else heading, model))
     return found
 
 
@@ -88,8 +96,11 @@ def field_docstrings(model: type[BaseModel]) -> dict[str, str]:
         assert isinstance(body, ast.ClassDef)
         for before, after in zip(body.body, body.body[1:], strict=False):
             if (
-                isinstance(before, ast.AnnAssign) and isinstance(before.target, ast.Name)
-                and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) and isinstance(after.value.value, str)
+                isinstance(before, ast.AnnAssign)
+                and isinstance(before.target, ast.Name)
+                and isinstance(after, ast.Expr)
+                and isinstance(after.value, ast.Constant)
+                and isinstance(after.value.value, str)
             ):
                 found[before.target.id] = inspect.cleandoc(after.value.value)
     return found

@@ -71,7 +71,7 @@ def _linked(text: str, page: str, repository: Path, source: Path, pages: set[str
 
     def followed(match: re.Match[str]) -> str:
         image, label, target = match.groups()
-        path, _, anchor = target.partition("#")
+        path, _, _ = target.partition("#")
         if not path or re.match(r"[a-z]+:", path):
             return match[0]
         there = Path(os.path.normpath(folder / path))
