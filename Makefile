@@ -21,7 +21,7 @@ PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_model
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports docs bench lint format clean
+.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports library docs bench lint format clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -112,6 +112,9 @@ endif
 
 docs: $(DOCS_STAMP) ## Build the documentation site into build/site/html; warnings and dead links are errors
 	@$(BIN)/python -m website
+
+library: $(STAMP) ## Check the library of robots and rebuild examples/library.json and docs/library.md
+	$(BIN)/python benchmarks/library.py
 
 bench: $(STAMP) ## Measure speed, as ratios in one run (BENCH_ARGS=--quick to try it); results in benchmarks/results
 	$(BIN)/python benchmarks/run.py $(BENCH_ARGS)
