@@ -4,6 +4,7 @@
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DOCS_STAMP := $(VENV)/.docs-installed
 UV := $(shell command -v uv 2>/dev/null)
 # The first of these that is new enough makes the environment.
 PYTHON ?= python3.13 python3.12 python3.11 python3
@@ -23,7 +24,7 @@ PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_model
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports bench lint format clean
+.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports library docs bench lint format clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -103,6 +104,21 @@ reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings i
 	  mkdir -p $$kept; \
 	  cp -R $$built/report.html $$built/report.md $$built/figures $$kept || exit 1; \
 	done
+
+$(DOCS_STAMP): $(STAMP)
+	@echo "setting up $(VENV) for the documentation"
+ifneq ($(UV),)
+	@"$(UV)" pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[docs]'
+else
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
+endif
+	@touch $@
+
+docs: $(DOCS_STAMP) ## Build the documentation site into build/site/html; warnings and dead links are errors
+	@$(BIN)/python -m website
+
+library: $(STAMP) ## Check the library of robots and rebuild examples/library.json and docs/library.md
+	$(BIN)/python benchmarks/library.py
 
 bench: $(STAMP) ## Measure speed, as ratios in one run (BENCH_ARGS=--quick to try it); results in benchmarks/results
 	$(BIN)/python benchmarks/run.py $(BENCH_ARGS)
