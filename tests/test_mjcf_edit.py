@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from robots import peak_error
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, OutputError, ParameterError, WorkbenchError
-from workbench.mjcf.text import find, scan, tokens
+from workbench.mjcf.text import Edit, find, replace_numbers, scan, tokens
 from workbench.robots.assignments import parse_assignment, resolve_changes
 from workbench.robots.edit import edit_file, resolve_for
 from workbench.robots.load import LoadedModel, load_model
@@ -386,3 +386,30 @@ def test_huge_values_are_refused_by_the_closed_form_too() -> None:
     for value in (1e300, -1e300, 10**400):
         with pytest.raises(ParameterError, match=r"parameter g = .*at most 1e"):
             load_mechanism(ASYM).with_parameters(g=value)
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (Edit("inertial", "arm", "mass", 0, 1.0), "is missing; MuJoCo computes it from the geoms"),
+        (Edit("inertial", "leg", "mass", 0, 1.0), "is missing"),
+        (Edit("joint", "arm", "range", 0, 1.0), "is missing"),
+        (Edit("geom", "arm", "size", 0, 1.0), "is missing"),  # one of two
+        (Edit("geom", "one", "size", 1, 1.0), "size lacks number 2; write it out"),
+        (Edit("geom", "one", "pos", 0, 1.0), "pos is not written; write it out"),
+    ],
+)
+def test_what_cannot_be_edited_says_why(edit: Edit, said: str) -> None:
+    geoms = '<geom name="one" size="1"/><geom size="1"/>'
+    text = f'<mujoco>\n<worldbody><body name="arm">{geoms}</body></worldbody></mujoco>'
+    with pytest.raises(ModelError, match=re.escape(said)) as found:
+        replace_numbers(text, "m.xml", [edit])
+    assert str(found.value).startswith("m.xml:")
+    if said == "is missing":
+        assert str(found.value).endswith(said)
+
+
+def test_a_body_is_found_by_its_only_geom() -> None:
+    text = '<mujoco><worldbody><body name="arm"><geom size="1 2" mass="3"/></body></worldbody></mujoco>'
+    edits = [Edit("geom", "arm", "size", 1, 4.0), Edit("inertial", "arm", "mass", 0, 5.0)]
+    assert replace_numbers(text, "m.xml", edits) == text.replace('"1 2"', '"1 4"').replace('"3"', '"5"')
