@@ -108,7 +108,7 @@ def test_a_random_robot_of_each_kind_is_round_off_away_from_mujoco(name: str) ->
 def test_each_parameter_of_a_formula_is_seen(name: str) -> None:
     spec = entry(name).robot.spec.parameters
     values = trial(name, 1)[0]
-    read = [key for key, value in values.items() if value and spec[key].meaning != STARTS]
+    read = [key for key, value in values.items() if value and not spec[key].meaning.endswith(STARTS)]
     assert len(read) > 2
     for key in read:
         spoiled = values | {key: values[key] * 1.001}
