@@ -4,6 +4,7 @@
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DOCS_STAMP := $(VENV)/.docs-installed
 UV := $(shell command -v uv 2>/dev/null)
 # The first of these that is new enough makes the environment.
 PYTHON ?= python3.13 python3.12 python3.11 python3
@@ -20,7 +21,7 @@ PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_model
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports library bench lint format clean
+.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports library docs bench lint format clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -90,6 +91,7 @@ reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings i
 	    $(BIN)/workbench run campaigns/$$name.toml --quick --out $$drawn >/dev/null || exit 1; \
 	    if [ -f $$drawn/pictures/film.webp ]; then mkdir -p $$kept; cp -R $$drawn/pictures $$kept/pictures; fi; \
 	  fi; \
+	  rm -rf $$built/pictures; \
 	  $(BIN)/workbench run campaigns/$$name.toml --no-pictures --out $$built || exit 1; \
 	  if [ -d $$kept/pictures ]; then \
 	    cp -R $$kept/pictures $$built/pictures && $(BIN)/workbench report $$built >/dev/null || exit 1; \
@@ -98,6 +100,18 @@ reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings i
 	  mkdir -p $$kept; \
 	  cp -R $$built/report.html $$built/report.md $$built/figures $$kept || exit 1; \
 	done
+
+$(DOCS_STAMP): $(STAMP)
+	@echo "setting up $(VENV) for the documentation"
+ifneq ($(UV),)
+	@"$(UV)" pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[docs]'
+else
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
+endif
+	@touch $@
+
+docs: $(DOCS_STAMP) ## Build the documentation site into build/site/html; warnings and dead links are errors
+	@$(BIN)/python -m website
 
 library: $(STAMP) ## Check the library of robots and rebuild examples/library.json and docs/library.md
 	$(BIN)/python benchmarks/library.py

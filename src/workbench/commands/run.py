@@ -66,7 +66,7 @@ def run(
         bool,
         typer.Option(
             "--replace",
-            help="Replace an earlier run of another robot, other cases or candidates, or of more evidence.",
+            help="Replace an earlier run of another robot, other cases or candidates, of more evidence, with pictures.",
         ),
     ] = False,
     good: Annotated[
