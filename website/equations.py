@@ -27,7 +27,7 @@ MOVES = (*"qxyzrhtslpuvwgnCDPEF", *GREEK)
 """What ``d`` and ``dd`` behind it make a rate; behind others, ``md``, it is an index."""
 
 SIGNS = {
-    "+-": r"\pm", "-+": r"\mp", "<=": r"\le", ">=": r"\ge", "=:": "=:", ":=": ":=", "->": r"\to", "~": r"\approx",
+    "+-": r"\pm", "-+": r"\mp", "<=": r"\le", ">=": r"\ge", "=:": r"=\!:", ":=": r":\!=", "->": r"\to", "~": r"\approx",
     "+": "+", "-": "-", "=": "=", "<": "<", ">": ">", ",": ",", ";": ";", ":": ":",
 }  # fmt: skip
 WORDS = ("as", "of", "on", "at", "is", "if", "to", "or", "by", "in", "no", "an", "we", "it", "for")
@@ -37,7 +37,8 @@ TOKEN = re.compile(
     r"(?P<gap> *)(?:(?P<size>\d+x\d+)|(?P<number>\d+(?:\.\d+)?(?:e-?\d+)?)|(?P<name>[A-Za-z]+\d*'*(?:_[A-Za-z0-9]+)*'*)"
     r"|(?P<sign>\+-|-\+|<=|>=|=:|:=|->|[-+*/^=<>,;:.~()\[\]{}|]))"
 )
-WORD = re.compile(r"^\{*\\text\{|^\\operatorname")
+WORD = re.compile(r"^\{*\\text\{")
+RELATION = re.compile(r"(?<= )(?:=(?:\\!:)?|:\\!=|<|>|\\le|\\ge|\\approx)(?= )")
 WIDE = 3
 """So many blanks between two parts of a line keep them apart."""
 
@@ -64,12 +65,13 @@ def equations(block: str) -> str:
         Something in it cannot be read with certainty.
     """
     rows = [Reader(line).tex() for line in _whole_lines(block)]
-    if not any("=" in row or "<" in row or r"\le" in row for row in rows):
+    if not any(RELATION.search(row) or re.search(r"\\frac|\\int|\^", row) for row in rows):
         raise UnreadableError("no relation")
     if len(rows) == 1:
         return rows[0]
+    aligned = [RELATION.sub(r" &\g<0>", row, count=1).replace("  &", " &") for row in rows]
     aligned = [
-        re.sub(r" ([=<]|\\le|\\ge) ", r" &\1 ", row, count=1) if "=" in row else rf"&\quad {row}" for row in rows
+        row if "&" in re.sub(r"\\begin\{bmatrix\}.*?\\end\{bmatrix\}", "", row) else rf"&\quad {row}" for row in aligned
     ]
     return "\\begin{aligned}\n" + " \\\\\n".join(aligned) + "\n\\end{aligned}"
 
@@ -200,17 +202,14 @@ class Reader:
         elif token.kind == "name":
             text = self._named(token.text)
         elif token.text == "(":
-            text = self._star() or rf"\left( {self.group(')')} \right)"
+            text = self._star() or _bracketed("(", self.group(")"), ")")
         elif token.text == "[":
-            text = (
-                self._matrix()
-                if self.next is not None and self.next.text == "["
-                else rf"\left[ {self.group(']')} \right]"
-            )
+            rows = self.next is not None and self.next.text == "["
+            text = self._matrix() if rows else _bracketed("[", self.group("]"), "]")
         elif token.text == "{":
-            text = rf"\left\{{ {self.group('}')} \right\}}"
+            text = _bracketed(r"\{", self.group("}"), r"\}")
         elif token.text == "|":
-            text = rf"\left\lvert {self.group('|')} \right\rvert"
+            text = _bracketed(r"\lvert", self.group("|"), r"\rvert")
         else:
             raise UnreadableError(f"no factor begins with {token.text}")
         while self.next is not None and self.next.text == "^":
@@ -257,7 +256,7 @@ class Reader:
         text = self.group("]")
         cell = ""
         for part in text.split(" "):
-            depth += part.count(r"\left") - part.count(r"\right")
+            depth += _opened(part)
             if part == "," and not depth:
                 cells.append(cell)
                 cell = ""
@@ -282,23 +281,40 @@ def _joined(parts: list[tuple[str, str]]) -> str:
     """TeX of parts in a row, words apart from their neighbours."""
     text = ""
     for number, (tex, sign) in enumerate(parts):
-        apart = (
-            number and not sign and not parts[number - 1][1] and (WORD.match(tex) or WORD.match(parts[number - 1][0]))
-        )
-        text += f"{' ' if text else ''}{chr(92) + '; ' if apart else ''}{tex}"
+        before, its_sign = parts[number - 1] if number else ("", ",")
+        apart = ""
+        if not sign and not its_sign:
+            if WORD.match(tex) or WORD.match(before):
+                apart = r"\; "
+            elif tex in FUNCTIONS.values() or (before in FUNCTIONS.values() and not re.match(r"(\\left)?\(", tex)):
+                apart = r"\, "
+        text += f"{' ' if text else ''}{apart}{tex}"
     return text
+
+
+def _bracketed(opening: str, inner: str, closing: str) -> str:
+    """A group; its brackets grow where something in it is tall."""
+    tall = any(sign in inner for sign in (r"\frac", r"\sqrt", r"\begin", r"\int", r"\sum"))
+    return rf"\left{opening} {inner} \right{closing}" if tall else f"{opening} {inner} {closing}"
+
+
+def _opened(part: str) -> int:
+    """How many round brackets a piece of TeX opens and does not close."""
+    return part.count("(") - part.count(")")
 
 
 def _bare(text: str) -> str:
     """TeX without the round brackets around all of it, where a line or a place says the same."""
-    if not (text.startswith(r"\left( ") and text.endswith(r" \right)")):
+    begins = re.match(r"(?:\\left)?\( ", text)
+    ends = re.search(r" (?:\\right)?\)$", text)
+    if not begins or not ends:
         return text
     depth = 0
     for part in text.split(" ")[:-1]:
-        depth += part.count(r"\left") - part.count(r"\right")
+        depth += _opened(part)
         if depth == 0:
             return text
-    return text.removeprefix(r"\left( ").removesuffix(r" \right)")
+    return text[begins.end() : ends.start()]
 
 
 def _number(text: str) -> str:
@@ -328,7 +344,7 @@ def _letters(letters: str) -> tuple[str, str]:
     for suffix, accent in (("dd", "ddot"), ("d", "dot")):
         base = letters.removesuffix(suffix)
         if letters.endswith(suffix) and base in MOVES:
-            return rf"\{accent}{{{_letters(base)[0]}}}", ""
+            return rf"{{\{accent}{{{_letters(base)[0]}}}}}", ""
     base = letters.removeprefix("d")
     if letters.startswith("d") and (len(base) == 1 or base in GREEK):
         return rf"\mathrm{{d}}{_letters(base)[0]}" if len(base) == 1 else rf"\mathrm{{d}}\{base}", ""
