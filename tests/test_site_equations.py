@@ -11,8 +11,8 @@ from website.equations import UnreadableError, equations
 
 READ = {
     "x1 = q1": "x_{1} = q_{1}",
-    "qd2 = xd": r"{\dot{q}}_{2} = {\dot{x}}",
-    "omega = Cdd": r"\omega = {\ddot{C}}",
+    "qd2 = xd": r"\dot{q}_{2} = \dot{x}",
+    "omega = Cdd": r"\omega = \ddot{C}",
     "md = 2": "m_{d} = 2",
     "a1_left = L": r"a_{1,\mathrm{left}} = L",
     "J_x^-1 J_q = J^T": r"{J_{x}}^{-1} J_{q} = {J}^{\top}",
@@ -26,11 +26,12 @@ READ = {
     "S = sum 1 / p_i^2": r"S = \sum \, \frac{1}{{p_{i}}^{2}}",
     "b = a / cos b": r"b = \frac{a}{\cos b}",
     "y = +-sqrt(q1^2 - z^2)": r"y = \pm \sqrt{{q_{1}}^{2} - {z}^{2}}",
-    "|rd_i|^2 = e^(iu)": r"{\lvert {\dot{r}}_{i} \rvert}^{2} = {e}^{i u}",
+    "|rd_i|^2 = e^(iu)": r"{\lvert \dot{r}_{i} \rvert}^{2} = {e}^{i u}",
     "M = [[a, b (1-k)], [c, d]]": r"M = \begin{bmatrix} a & b ( 1 - k ) \\ c & d \end{bmatrix}",
     "f = m payload": r"f = m \; \text{payload}",
     "n''_across = 0": r"n_{\mathrm{across}}'' = 0",
     "(a/b + c)^2 = det J": r"{\left( \frac{a}{b} + c \right)}^{2} = \det \, J",
+    "a = cos b (c + external_force)": r"a = \cos \, b \, ( c + \text{external_force} )",
     "a = 1,    b = 2": r"a = 1 , \qquad b = 2",
     "a = (1,\n     b)": r"a = ( 1 , b )",
 }

@@ -282,11 +282,16 @@ def _joined(parts: list[tuple[str, str]]) -> str:
     text = ""
     for number, (tex, sign) in enumerate(parts):
         before, its_sign = parts[number - 1] if number else ("", ",")
+        argument = number > 1 and parts[number - 2][0] in FUNCTIONS.values()
         apart = ""
         if not sign and not its_sign:
             if WORD.match(tex) or WORD.match(before):
                 apart = r"\; "
-            elif tex in FUNCTIONS.values() or (before in FUNCTIONS.values() and not re.match(r"(\\left)?\(", tex)):
+            elif (
+                argument
+                or tex in FUNCTIONS.values()
+                or (before in FUNCTIONS.values() and not re.match(r"(\\left)?\(", tex))
+            ):
                 apart = r"\, "
         text += f"{' ' if text else ''}{apart}{tex}"
     return text
@@ -330,7 +335,7 @@ def _name(name: str) -> str:
     digits = stem[len(letters) :]
     text, index = _letters(letters)
     if not text:
-        return r"\text{" + name.rstrip("'").replace("_", r"\_") + "}" + "'" * primes
+        return r"\text{" + name.rstrip("'") + "}" + "'" * primes
     below = [part for part in (index, digits, *map(_index, indices)) if part]
     return text + (f"_{{{','.join(below)}}}" if below else "") + "'" * primes
 
@@ -344,7 +349,7 @@ def _letters(letters: str) -> tuple[str, str]:
     for suffix, accent in (("dd", "ddot"), ("d", "dot")):
         base = letters.removesuffix(suffix)
         if letters.endswith(suffix) and base in MOVES:
-            return rf"{{\{accent}{{{_letters(base)[0]}}}}}", ""
+            return rf"\{accent}{{{_letters(base)[0]}}}", ""
     base = letters.removeprefix("d")
     if letters.startswith("d") and (len(base) == 1 or base in GREEK):
         return rf"\mathrm{{d}}{_letters(base)[0]}" if len(base) == 1 else rf"\mathrm{{d}}\{base}", ""
