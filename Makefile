@@ -21,7 +21,7 @@ PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_model
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports docs bench lint format clean
+.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports library docs bench lint format clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -91,6 +91,7 @@ reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings i
 	    $(BIN)/workbench run campaigns/$$name.toml --quick --out $$drawn >/dev/null || exit 1; \
 	    if [ -f $$drawn/pictures/film.webp ]; then mkdir -p $$kept; cp -R $$drawn/pictures $$kept/pictures; fi; \
 	  fi; \
+	  rm -rf $$built/pictures; \
 	  $(BIN)/workbench run campaigns/$$name.toml --no-pictures --out $$built || exit 1; \
 	  if [ -d $$kept/pictures ]; then \
 	    cp -R $$kept/pictures $$built/pictures && $(BIN)/workbench report $$built >/dev/null || exit 1; \
@@ -111,6 +112,9 @@ endif
 
 docs: $(DOCS_STAMP) ## Build the documentation site into build/site/html; warnings and dead links are errors
 	@$(BIN)/python -m website
+
+library: $(STAMP) ## Check the library of robots and rebuild examples/library.json and docs/library.md
+	$(BIN)/python benchmarks/library.py
 
 bench: $(STAMP) ## Measure speed, as ratios in one run (BENCH_ARGS=--quick to try it); results in benchmarks/results
 	$(BIN)/python benchmarks/run.py $(BENCH_ARGS)

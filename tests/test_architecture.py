@@ -22,7 +22,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("__main__", "cli", "commands", "console"),
     ("studio",),
     ("report", "compare", "rendering"),
-    ("sweep", "diagnosis", "importing"),
+    ("sweep", "diagnosis", "importing", "library"),
     ("campaign", "workspace"),
     ("capabilities",),
     ("recorded",),

@@ -105,6 +105,6 @@ def write_workspace(stage: Path, workspace: Workspace, robot: Robot) -> None:
     columns |= {joint: workspace.q[:, k] for k, joint in enumerate(robot.joints)}
     columns |= {f"measure_{name}": values for name, values in workspace.measures.items()}
     columns["condition"] = workspace.condition
-    pd.DataFrame(columns).to_parquet(stage / CELLS, index=False)
+    pd.DataFrame(columns).to_parquet(stage / CELLS, index=False, write_page_checksum=True)
     text = json.dumps(workspace_facts(workspace, robot), indent=1)
     (stage / FACTS).write_text(text + "\n", encoding="utf-8")
