@@ -19,6 +19,10 @@ TRACKED, UNSTABLE, BLOCKED = "tracked", "unstable", "blocked"
 LOST = 1.0
 """Strokes of a joint: an error beyond is no tracking any more, and the loop is called unstable."""
 
+NEARBY = 0.5
+"""Strokes: a robot that is nearer to its motion when its loops cannot be closed has met a singular pose and has not
+run away."""
+
 SMALLEST_STROKE = 0.05
 """m or rad: a joint that holds (almost) still is measured against this."""
 
@@ -98,23 +102,30 @@ def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, ste
     x = np.zeros((count, 3))
 
     def ended_at(status: str, k: int, reached: int, joint: int) -> Tracked:
-        parts = (array[:reached] for array in (q, qd, x, tau))
-        return Tracked(status, float(desired.t[k]), joint, *parts, hits / max(reached, 1), work)
+        return Tracked(
+            status, float(desired.t[k]), joint, q[:reached], qd[:reached], x[:reached], tau[:reached],
+            hits / max(reached, 1), work,
+        )  # fmt: skip
+
+    def worst_of(now: FloatArray, k: int) -> tuple[int, float]:
+        off = np.abs(now - desired.q[k]) / scale
+        worst = int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
+        return worst, float(off[worst])
 
     hits = np.zeros(na)
-    work = 0.0
+    work, limited = 0.0, bool(np.isfinite(sampling.limit).any())
     for k in range(count):
         q[k], qd[k], x[k] = plant.q, plant.qd, plant.platform
-        off = np.abs(q[k] - desired.q[k]) / scale
-        worst = int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
-        if not off[worst] <= 1.0:
-            return ended_at(UNSTABLE, k, k, worst)
+        if not bool((np.abs(q[k] - desired.q[k]) <= scale).all()):
+            return ended_at(UNSTABLE, k, k, worst_of(q[k], k)[0])
         try:
             wanted = np.asarray(law(k, *encoder.measure(q[k], qd[k])), dtype=np.float64)
         except MotionError:  # the model cannot follow to where the robot has gone, or is thought to be
-            return ended_at(BLOCKED, k, k, worst)
-        hits += np.abs(wanted) > sampling.limit
-        tau[k] = np.clip(wanted, -sampling.limit, sampling.limit)
+            return ended_at(BLOCKED, k, k, worst_of(q[k], k)[0])
+        if limited:
+            hits += np.abs(wanted) > sampling.limit
+            wanted = np.clip(wanted, -sampling.limit, sampling.limit)
+        tau[k] = wanted
         if k == count - 1:
             break
         before = q[k]
@@ -125,8 +136,7 @@ def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, ste
             work += float(held @ (plant.q - before))
             before = plant.q.copy()
             if ended != DONE:
-                off = np.abs(before - desired.q[k]) / scale
-                worst = int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
-                status = BLOCKED if ended == OPEN and off[worst] < 0.5 else UNSTABLE
+                worst, off = worst_of(before, k)
+                status = BLOCKED if ended == OPEN and off < NEARBY else UNSTABLE
                 return ended_at(status, k, k + 1, worst)
     return ended_at(TRACKED, count - 1, count, -1)

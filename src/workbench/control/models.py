@@ -7,6 +7,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.capabilities.robot import Robot
 from workbench.errors import WorkbenchError
+from workbench.robots.kernel_call import TorqueKernel
 
 SAME = 1e-9
 """Of the largest torque: a robot's compiled closed form stands for the formula of its name if it is off by less."""
@@ -29,7 +30,7 @@ class FormulaModel:
         self._robot, self._candidate = robot, robot.candidates[name]
         self._force = np.array(force, dtype=np.float64)
         self._row = self._force[None]
-        self._kernel = None
+        self._kernel: TorqueKernel | None = None
         self._out = np.zeros(len(robot.joints))
         if robot.closed_form is not None and name in robot.closed_form.mass_models:
             self._take_kernel(name)
@@ -58,4 +59,5 @@ class FormulaModel:
         """Torques ``(na,)``; the array is written over by the next call."""
         if self._kernel is not None:
             return self._kernel(q, qd, qdd, self._force, self._out)
-        return self._function(q[None], qd[None], qdd[None])[0]
+        found: FloatArray = self._function(q[None], qd[None], qdd[None])[0]
+        return found

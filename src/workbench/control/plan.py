@@ -109,34 +109,36 @@ def plan_study(
             key="limits",
         )
     loops = []
-    for case in campaign.case:
+    for one_case in campaign.case:
         for speed in spec.speeds:
-            if not math.isclose(speed, 1.0) and case.motion.kind not in FASTER:
+            if not math.isclose(speed, 1.0) and one_case.motion.kind not in FASTER:
                 raise SpecError(
-                    f'{where}: case "{case.name}": a motion of kind {case.motion.kind} has no formula to be made'
-                    " faster; allowed: speeds = [1.0]",
+                    f'{where}: case "{one_case.name}": no formula makes a motion of kind {one_case.motion.kind} faster;'
+                    " allowed: speeds = [1.0]",
                     file=str(file),
-                    case=case.name,
+                    case=one_case.name,
                 )
-            length = _duration(campaign, file, path, robot, case_at(case, speed), settings or {}, spec)
-            for controller in spec.controllers:
-                for one_model in spec.models:
-                    if not _goes_with(controller, one_model):
+            length = _duration(campaign, file, path, robot, case_at(one_case, speed), settings or {}, spec)
+            for controller, one_model in pairs_of(spec):
+                for asked in spec.rates:
+                    found = rate_of(spec, asked, one_model)
+                    if found is None:
                         continue
-                    for asked in spec.rates:
-                        found = rate_of(spec, asked, one_model)
-                        if found is None:
-                            continue
-                        _check_times(spec, found, one_model, length, f'{where}: case "{case.name}"')
-                        loops += [
-                            Loop(case.name, controller, one_model, speed, found, _shown(asked), bandwidth)
-                            for bandwidth in spec.bandwidths
-                        ]
+                    _check_times(spec, found, one_model, length, f'{where}: case "{one_case.name}"')
+                    loops += [
+                        Loop(one_case.name, controller, one_model, speed, found, _shown(asked), bandwidth)
+                        for bandwidth in spec.bandwidths
+                    ]
     if not loops:
         raise SpecError(f"{where}: no controller goes with any of the models; pd goes with model none", file=str(file))
     if len(loops) > MOST_RUNS:
         raise SpecError(f"{where}: {len(loops)} runs; allowed: at most {MOST_RUNS}", file=str(file))
     return StudyPlan(campaign, file, path, robot, tuple(loops))
+
+
+def pairs_of(spec: ControlSpec) -> list[tuple[str, str]]:
+    """Controllers with the models that go with them."""
+    return [(c, model) for c in spec.controllers for model in spec.models if _goes_with(c, model)]
 
 
 def _goes_with(controller: str, model: str) -> bool:

@@ -89,10 +89,10 @@ class UserController:
         one = None if model is None else lambda q, qd, qdd: np.array(model.one(_own(q), _own(qd), _own(qdd)))
 
         def called(k: int, q: FloatArray, qd: FloatArray) -> FloatArray:
-            sealed = [_sealed(values) for values in (q, qd, desired.q[k], desired.qd[k], desired.qdd[k])]
             sample = Sample(
-                float(desired.t[k]), *sealed, gains.kp, gains.kd, _sealed(gains.mass), 1.0 / rate, one, memory
-            )
+                float(desired.t[k]), _sealed(q), _sealed(qd), _sealed(desired.q[k]), _sealed(desired.qd[k]),
+                _sealed(desired.qdd[k]), gains.kp, gains.kd, _sealed(gains.mass), 1.0 / rate, one, memory,
+            )  # fmt: skip
             try:
                 found = bounded(lambda: self._call(parameters, sample), LIMIT_S)
             except UnrulyError as trouble:
