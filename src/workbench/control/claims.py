@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from workbench.campaign.control_spec import PRINTED_COST, ControlClaim, ControlSpec
+from workbench.control.figures import DECIDED
 from workbench.control.plan import Loop
 
 HOLDS, REFUTED, UNDECIDED = "holds", "does not hold", "cannot be decided"
@@ -92,12 +93,17 @@ def points_of(
         if claim.model not in models or claim.against not in models:
             continue
         one, other = models[claim.model].errors, models[claim.against].errors
+        if not one and not other:
+            continue  # neither tracks: that is not the model's doing
+        if any(errors and route not in errors for errors in (one, other)):
+            continue
         error, against = one.get(route, math.inf), other.get(route, math.inf)
         share = _share(error, against)
         shares = [_share(one[r], other[r]) for r in ROUTES if r in one and r in other]
         spread = max((abs(value - share) for value in shares), default=math.nan) if math.isfinite(share) else 0.0
+        vouched = spec.second_route == "none" or ("rms_second" in one and "rms_second" in other)
         # one route alone vouches for nothing
-        uncertainty = spread if len(shares) > 1 or not math.isfinite(share) else math.nan
+        uncertainty = spread if not math.isfinite(share) or (vouched and len(shares) > 1) else math.nan
         found.append(
             Point(
                 case, speed, rate, width, error, against, share, uncertainty, _enough(error, share, uncertainty, spec)
@@ -118,7 +124,7 @@ def _share(error: float, against: float) -> float:
 
 def _enough(error: float, share: float, uncertainty: float, spec: ControlSpec) -> bool | None:
     """Enough where the error does not matter, or is hardly larger than the other model's."""
-    if error * (1.0 + 0.1) <= spec.wanted:
+    if error * (1.0 + DECIDED) <= spec.wanted:
         return True
     if math.isnan(share) or math.isnan(uncertainty):
         return None
@@ -134,14 +140,18 @@ def _worst(points: Sequence[Point]) -> str:
     known = [point for point in points if not math.isnan(point.share)]
     if not known:
         return ""
-    worst = max(known, key=lambda point: point.share)
+    worst = max(known, key=lambda point: (point.fine is False, point.share))
     if math.isinf(worst.error):
-        return f"unstable in {worst.case} at speed {worst.speed:g}, {worst.rate} Hz, {worst.bandwidth:g} Hz bandwidth"
+        return f"unstable in {worst.case} at speed {worst.speed:g}, {_rate(worst)}, {worst.bandwidth:g} Hz bandwidth"
     return (
         f"at worst {100 * worst.share:+.3g} % (known to {100 * worst.uncertainty:.2g} %) in {worst.case} at speed"
-        f" {worst.speed:g}, {worst.rate} Hz, bandwidth {worst.bandwidth:g} Hz: {1e3 * worst.error:.3g} mm against"
+        f" {worst.speed:g}, {_rate(worst)}, bandwidth {worst.bandwidth:g} Hz: {1e3 * worst.error:.3g} mm against"
         f" {1e3 * worst.against:.3g} mm"
     )
+
+
+def _rate(point: Point) -> str:
+    return "rates of the printed costs" if point.rate == PRINTED_COST else f"{point.rate} Hz"
 
 
 def _counted(claim: ControlClaim, points: Sequence[Point]) -> str:

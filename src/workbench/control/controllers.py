@@ -65,7 +65,7 @@ def law_of(controller: str, model: Model | None, gains: Gains, desired: Desired)
         known = _needed(controller, model)
 
         def computed(k: int, q: FloatArray, qd: FloatArray) -> FloatArray:
-            return known.one(q, qd, desired.qdd[k] + kp * (desired.q[k] - q) + kd * (desired.qd[k] - qd))
+            return known.one(q, qd, desired.qdd[k] + kp * (desired.q[k] - q) + kd * (desired.rates[k] - qd))
 
         return computed
     fed = np.zeros_like(desired.q)
@@ -73,7 +73,7 @@ def law_of(controller: str, model: Model | None, gains: Gains, desired: Desired)
         fed = _needed(controller, model).batch(desired.q, desired.qd, desired.qdd)
 
     def pd(k: int, q: FloatArray, qd: FloatArray) -> FloatArray:
-        found: FloatArray = fed[k] + stiffness * (desired.q[k] - q) + damping * (desired.qd[k] - qd)
+        found: FloatArray = fed[k] + stiffness * (desired.q[k] - q) + damping * (desired.rates[k] - qd)
         return found
 
     if controller != "pd + weight":

@@ -14,14 +14,10 @@ from workbench.control.sampling import TICK, Desired, Encoder, Sampling
 from workbench.errors import MotionError
 from workbench.reference.forward_kernels import DONE, OPEN
 
-TRACKED, UNSTABLE, BLOCKED = "tracked", "unstable", "blocked"
+TRACKED, UNSTABLE = "tracked", "unstable"
 
 LOST = 1.0
 """Strokes of a joint: an error beyond is no tracking any more, and the loop is called unstable."""
-
-NEARBY = 0.5
-"""Strokes: a robot that is nearer to its motion when its loops cannot be closed has met a singular pose and has not
-run away."""
 
 SMALLEST_STROKE = 0.05
 """m or rad: a joint that holds (almost) still is measured against this."""
@@ -54,7 +50,7 @@ class Tracked:
     """What a run left: states at the ticks, the torques that were asked for at them."""
 
     status: str
-    """`TRACKED`, `UNSTABLE`, or `BLOCKED`: the loops could not be closed on the branch"""
+    """`TRACKED` or `UNSTABLE`"""
     time: float
     """s, when it ended"""
     joint: int
@@ -68,6 +64,8 @@ class Tracked:
     """``(k, na)`` asked for, limits kept"""
     saturated: FloatArray = field(repr=False)
     """``(na,)`` part of the ticks at which a limit was met"""
+    why: str = ""
+    """of a run that failed: what ended it"""
     work: float = 0.0
     """J, of the actuators; exact for torques that are held"""
 
@@ -101,27 +99,26 @@ def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, ste
     q, qd, tau = np.zeros((3, count, na))
     x = np.zeros((count, 3))
 
-    def ended_at(status: str, k: int, reached: int, joint: int) -> Tracked:
+    def ended_at(status: str, k: int, reached: int, joint: int, why: str = "") -> Tracked:
         return Tracked(
             status, float(desired.t[k]), joint, q[:reached], qd[:reached], x[:reached], tau[:reached],
-            hits / max(reached, 1), work,
+            hits / max(reached, 1), why, work,
         )  # fmt: skip
 
-    def worst_of(now: FloatArray, k: int) -> tuple[int, float]:
+    def worst_of(now: FloatArray, k: int) -> int:
         off = np.abs(now - desired.q[k]) / scale
-        worst = int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
-        return worst, float(off[worst])
+        return int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
 
     hits = np.zeros(na)
     work, limited = 0.0, bool(np.isfinite(sampling.limit).any())
     for k in range(count):
         q[k], qd[k], x[k] = plant.q, plant.qd, plant.platform
         if not bool((np.abs(q[k] - desired.q[k]) <= scale).all()):
-            return ended_at(UNSTABLE, k, k, worst_of(q[k], k)[0])
+            return ended_at(UNSTABLE, k, k, worst_of(q[k], k), "is off by more than its stroke")
         try:
             wanted = np.asarray(law(k, *encoder.measure(q[k], qd[k])), dtype=np.float64)
         except MotionError:  # the model cannot follow to where the robot has gone, or is thought to be
-            return ended_at(BLOCKED, k, k, worst_of(q[k], k)[0])
+            return ended_at(UNSTABLE, k, k, worst_of(q[k], k), "is off most where the model has no torque to give")
         if limited:
             hits += np.abs(wanted) > sampling.limit
             wanted = np.clip(wanted, -sampling.limit, sampling.limit)
@@ -136,7 +133,10 @@ def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, ste
             work += float(held @ (plant.q - before))
             before = plant.q.copy()
             if ended != DONE:
-                worst, off = worst_of(before, k)
-                status = BLOCKED if ended == OPEN and off < NEARBY else UNSTABLE
-                return ended_at(status, k, k + 1, worst)
+                why = (
+                    "is off most where the loops cannot be closed"
+                    if ended == OPEN
+                    else "is off most, and beyond numbers"
+                )
+                return ended_at(UNSTABLE, k, k + 1, worst_of(before, k), why)
     return ended_at(TRACKED, count - 1, count, -1)

@@ -124,7 +124,7 @@ def plan_study(
                     found = rate_of(spec, asked, one_model)
                     if found is None:
                         continue
-                    _check_times(spec, found, one_model, length, f'{where}: case "{one_case.name}"')
+                    _check_times(spec, asked, found, one_model, length, f'{where}: case "{one_case.name}"')
                     loops += [
                         Loop(one_case.name, controller, one_model, speed, found, _shown(asked), bandwidth)
                         for bandwidth in spec.bandwidths
@@ -158,6 +158,12 @@ def rate_of(spec: ControlSpec, asked: float | str, model: str) -> float | None:
     if model == NO_MODEL:
         return None
     return min(1e6 / spec.printed_cost[model], spec.highest_rate or math.inf)
+
+
+def delay_of(spec: ControlSpec, rate: float, asked: str, model: str) -> float:
+    """From measuring to torque, s; at the rate that a printed cost sets, the cost itself."""
+    cost = spec.printed_cost.get(model)
+    return (cost or 0.0) * 1e-6 if asked == PRINTED_COST else spec.delay.seconds(rate, cost)
 
 
 def case_at(case: CaseSpec, speed: float) -> CaseSpec:
@@ -198,7 +204,7 @@ def _duration(
     return min(length, spec.duration or math.inf)
 
 
-def _check_times(spec: ControlSpec, rate: float, model: str, length: float, where: str) -> None:
+def _check_times(spec: ControlSpec, asked: float | str, rate: float, model: str, length: float, where: str) -> None:
     ticks = length * rate
     if ticks < 2.0:
         raise SpecError(f"{where}: rate {rate:g} Hz gives {ticks:.3g} ticks in {length:.4g} s; allowed: 2 or more")
@@ -211,6 +217,6 @@ def _check_times(spec: ControlSpec, rate: float, model: str, length: float, wher
         raise SpecError(
             f"{where}: rate {rate:g} Hz is above the plant's step of {spec.step:g} s; allowed: step <= {1 / rate:.6g}"
         )
-    delay = spec.delay.seconds(rate, spec.printed_cost.get(model))
+    delay = delay_of(spec, rate, _shown(asked), model)
     if delay >= length:
         raise SpecError(f"{where}: a delay of {delay:.4g} s is longer than the motion of {length:.4g} s", key="delay")

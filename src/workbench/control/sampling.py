@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -50,12 +50,30 @@ class Desired:
     """``(n, na)``"""
     qd: FloatArray = field(repr=False)
     qdd: FloatArray = field(repr=False)
+    differences: FloatArray | None = field(default=None, repr=False)
+    """``(n, na)`` rates as an encoder would give them, where it gives no others"""
+
+    @property
+    def rates(self) -> FloatArray:
+        """``(n, na)`` what measured rates are held against."""
+        return self.qd if self.differences is None else self.differences
 
     @property
     def stroke(self) -> FloatArray:
         """``(na,)`` how far each joint goes."""
         found: FloatArray = np.ptp(self.q, axis=0)
         return found
+
+
+def as_measured(desired: Desired, sampling: Sampling) -> Desired:
+    """The motion with rates as the encoder would give them: differences are held against differences.
+
+    A difference is half a period late; against the rate of this moment it would count that as an error.
+    """
+    if sampling.ideal_rate:
+        return desired
+    rates = np.diff(desired.q, axis=0) / np.diff(desired.t)[:, None]
+    return replace(desired, differences=np.concatenate([desired.qd[:1], rates]))
 
 
 def desired_at_ticks(course: Course, start: float, stop: float, rate: float) -> Desired:

@@ -90,7 +90,7 @@ class UserController:
 
         def called(k: int, q: FloatArray, qd: FloatArray) -> FloatArray:
             sample = Sample(
-                float(desired.t[k]), _sealed(q), _sealed(qd), _sealed(desired.q[k]), _sealed(desired.qd[k]),
+                float(desired.t[k]), _sealed(q), _sealed(qd), _sealed(desired.q[k]), _sealed(desired.rates[k]),
                 _sealed(desired.qdd[k]), gains.kp, gains.kd, _sealed(gains.mass), 1.0 / rate, one, memory,
             )  # fmt: skip
             try:

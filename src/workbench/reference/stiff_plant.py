@@ -12,11 +12,11 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.reference.forward_kernels import DONE, LOST
 from workbench.reference.mujoco_reference import MujocoReference
-from workbench.reference.replay import LOOP_SOLIMP, near_rigid, quiet
+from workbench.reference.replay import LOOP_SOLIMP, near_rigid
 
 
 class StiffPlant:
-    """The same interface as `workbench.reference.forward.Plant`, by MuJoCo.
+    """The same interface as `workbench.reference.forward.Plant`, by MuJoCo; run it inside of `replay.quiet`.
 
     Parameters
     ----------
@@ -74,6 +74,5 @@ class StiffPlant:
         """Move on by *duration* seconds under constant torques ``(na,)``: `DONE`, or `LOST` where numbers are."""
         self._model.opt.timestep = duration / steps
         self._data.qfrc_applied[self._actuated] = tau
-        with quiet():
-            mujoco.mj_step(self._model, self._data, nstep=steps)
+        mujoco.mj_step(self._model, self._data, nstep=steps)
         return DONE if np.isfinite(self._data.qvel).all() and np.abs(self._data.qvel).max() < mujoco.mjMAXVAL else LOST
