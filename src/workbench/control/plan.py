@@ -98,7 +98,7 @@ def plan_study(
             if case not in [c.name for c in campaign.case]:
                 raise SpecError(f'{where}: claim "{one.id}": no case "{case}"')
     try:
-        robot.description.table.layered({}, spec.plant, {})
+        robot.description.table.changed(robot.values, spec.plant)
     except WorkbenchError as error:
         raise SpecError(f"{where}.plant: {error}", file=str(file), key="plant") from error
     if spec.limits and not torque_limits(campaign, robot):
