@@ -8,7 +8,10 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+from markdown_it import MarkdownIt
+
 from website import command_line, gallery, python_api, robot_pages, schema_pages
+from website.equations import UnreadableError, equations
 from website.pages_of import Section, repository_pages, sections
 
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^()\s]+)\)")
@@ -95,9 +98,23 @@ def _linked(text: str, page: str, repository: Path, source: Path, pages: set[str
         return match[0]
 
     lines, fence = [], ""
-    for line in text.splitlines():
+    for line in _with_equations(text).splitlines():
         mark = FENCE.match(line)
         if mark and (not fence or line.strip() == fence):
             fence = "" if fence else mark[1]
         lines.append(line if fence or mark or line.startswith("    ") else LINK.sub(followed, line))
     return "\n".join(lines) + "\n"
+
+
+def _with_equations(text: str) -> str:
+    """Give the page with its indented equations set; blocks that are none stay as they are."""
+    lines = text.splitlines()
+    for token in reversed(MarkdownIt("commonmark").parse(text)):
+        if token.type == "code_block" and token.level == 0 and token.map:
+            try:
+                tex = equations(token.content)
+            except UnreadableError:
+                continue
+            first, last = token.map
+            lines[first:last] = ["```math", *tex.splitlines(), "```", ""]
+    return "\n".join(lines)
