@@ -30,6 +30,7 @@ ELSEWHERE = {
     r"make (setup|test|test-slow|test-browser|run|docs)( |$)": "what the continuous integration does",
     r"make (mutants|bench|reports|format)( |$)": "by hand: hours, or they change files; test_mutants.py plans mutants",
     r"python benchmarks/": "by hand: they measure this machine",
+    r"workbench run --robots all": "make library does, and keeps what it finds; test_library.py runs one robot",
     r"pip install ": "test_distribution.py installs the wheel and the source distribution",
     r"workbench run \S+ --scheduler tcp://head": "test_sweep_run.py, on a cluster of this machine",
     r"dask ssh ": "needs machines to log in to",
