@@ -14,6 +14,9 @@ SLOW ?=
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 MUTANTS_ARGS ?=
+FLOORS_TESTS ?= $(patsubst %,tests/test_%.py,campaign_run campaign_spec case_figures cli closure_kinds compare_page data_files delimited \
+  edited_runs mjcf_roundtrip mjcf_setup pinocchio_reference portable recorded reference_closure rendering report_formats \
+  report_pictures statements studio_session sweep_run urdf)
 # Campaigns whose reports are kept in reports/published.
 PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models design_sweep
 
@@ -67,7 +70,8 @@ test-long: $(STAMP) ## Run the tests that take many minutes, by hand: all bad in
 test-browser: $(STAMP) ## Run the tests that open a report in Chromium
 	$(BIN)/pytest -n 2 -m browser $(PYTEST_ARGS)
 
-# The lowest versions that pyproject.toml allows, in an environment of their own; some minutes, so not among the other tests.
+# The lowest versions that pyproject.toml allows, in an environment of their own, with machine code of its own; some minutes,
+# so not among the other tests. Not all of the fast tests but those that use each dependency; FLOORS_TESTS=tests runs all.
 # What old libraries use of newer ones that is to go there some day is theirs: no error here.
 test-floors: $(STAMP) ## Run the tests with the lowest versions of all dependencies
 	@mkdir -p build && $(BIN)/python tests/floors.py > build/floors.txt
@@ -77,7 +81,7 @@ ifneq ($(UV),)
 else
 	@$(VENV)-floors/bin/python -m pip install --quiet --disable-pip-version-check --constraint build/floors.txt --editable '.[dev]'
 endif
-	$(VENV)-floors/bin/pytest -n 2 --dist worksteal -W ignore::DeprecationWarning $(PYTEST_ARGS)
+	NUMBA_CACHE_DIR=$(abspath build/floors-kernels) $(VENV)-floors/bin/pytest -n 2 --dist worksteal -W ignore::DeprecationWarning $(FLOORS_TESTS) $(PYTEST_ARGS)
 
 # Hours where CPU is scarce; what was tried is kept in build/mutants, so that it can be stopped and gone on with.
 mutants: $(STAMP) ## Plant small faults in the core modules and see which no test notices (MUTANTS_ARGS=--help)

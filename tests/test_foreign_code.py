@@ -118,6 +118,9 @@ COMMANDS = (
     (("compare", "first", "second", "--html", "page.html"), 0),
     (("diagnose", "small.toml"), None),
     (("docs", "evidence"), 0),
+    (("robots",), 0),
+    (("robots", "fourbar", "--copy", "fourbar"), 0),
+    (("run", "--robots", "fourbar", "--quick", "--out", "library"), 0),
     (("new", "imported", "--from", "changed.xml"), 0),
     (("new", "pendulum", "--from", "pendulum.urdf", "--actuated", "q1"), 2),
 )  # fmt: skip

@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field, ValidationError, field_validator, model_validator
 
 from workbench.campaign.candidate_spec import CandidateSpec, PrintedCost
+from workbench.campaign.control_spec import ControlSpec, DelaySpec
 from workbench.campaign.figure_spec import CANDIDATE_CURVE, FigureSpec
 from workbench.campaign.motion_spec import MOTIONS, Motion
 from workbench.campaign.recorded_spec import RecordedSpec
@@ -151,7 +152,12 @@ class Campaign(RobotKeys):
     figure: list[FigureSpec] = Field(default_factory=list)
     """what the report draws beyond its own figures"""
     sweep: SweepSpec | None = None
+<<<<<<< HEAD
     """varies the one case of the campaign into many"""
+=======
+    control: ControlSpec | None = None
+    """what tracks the cases' motions; then nothing else is computed"""
+>>>>>>> main
     good: Annotated[Finite, Field(gt=0)] | None = None
     """wanted accuracy of formulas without a bound: largest `peak_error`, a fraction; a sweep has ``sweep.good``"""
     actuators: dict[str, ActuatorSpec] | None = None
@@ -172,6 +178,15 @@ class Campaign(RobotKeys):
             )
         if self.sweep and (self.good is not None or self.actuators):
             raise ValueError("a campaign with a sweep has sweep.good in place of good, and no actuators")
+        return self
+
+    @model_validator(mode="after")
+    def _control_alone(self) -> Campaign:
+        if self.control and (self.sweep or self.candidate or self.claim or self.figure or self.recorded or self.good):
+            raise ValueError(
+                "a campaign with control has cases and no candidates, claims, figures, recorded torques, good or sweep:"
+                " the formulas stand in control.models, claims in control.claim"
+            )
         return self
 
 
@@ -231,7 +246,7 @@ FORM = Form(
     sections={
         "candidate": CandidateSpec, "case": CaseSpec, "claim": ClaimSpec, "figure": FigureSpec, "measure": Measure,
         "recorded": RecordedSpec, "sweep": SweepSpec, "vary": Vary, "filter": Filter, "printed_cost": PrintedCost,
-        "actuators": ActuatorSpec,
+        "actuators": ActuatorSpec, "control": ControlSpec, "delay": DelaySpec,
     },
     kinds=MOTIONS,
     kinds_of="motion",
@@ -240,7 +255,8 @@ FORM = Form(
 
 def _check_names(campaign: Campaign, file: str) -> None:
     """Names that have to be unique, and names that have to exist."""
-    if not campaign.candidate and campaign.actuated is None and campaign.robot is None and not campaign.recorded:
+    named = campaign.actuated is not None or campaign.robot is not None
+    if not campaign.candidate and not named and not campaign.recorded and campaign.control is None:
         raise SpecError(f"{file}: candidate: missing; a campaign compares at least one", file=file)
     cases = [case.name for case in campaign.case]
     for name in cases:
