@@ -152,12 +152,9 @@ class Campaign(RobotKeys):
     figure: list[FigureSpec] = Field(default_factory=list)
     """what the report draws beyond its own figures"""
     sweep: SweepSpec | None = None
-<<<<<<< HEAD
     """varies the one case of the campaign into many"""
-=======
     control: ControlSpec | None = None
     """what tracks the cases' motions; then nothing else is computed"""
->>>>>>> main
     good: Annotated[Finite, Field(gt=0)] | None = None
     """wanted accuracy of formulas without a bound: largest `peak_error`, a fraction; a sweep has ``sweep.good``"""
     actuators: dict[str, ActuatorSpec] | None = None
