@@ -25,6 +25,8 @@ html_show_sphinx = False
 html_copy_source = False
 html_last_updated_fmt = None
 html_theme_options = {"navigation_with_keys": True}
+# A block without a language is no Python.
+highlight_language = "text"
 pygments_style = "friendly"
 pygments_dark_style = "monokai"
 

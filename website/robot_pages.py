@@ -9,7 +9,7 @@ from website.pages_of import below
 
 ROBOT_FILE = "robot.toml"
 
-HEAD = """# Robots
+HEAD = """# Folders of robots
 
 A robot is a folder: an MJCF, a `robot.toml` ([every key](docs/robots.md)), formulas, a campaign. Each page derives its
 formula and says where its numbers come from.
