@@ -135,6 +135,8 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("models", "campaigns", "examples"):
         shutil.copytree(REPOSITORY / name, place / name, ignore=shutil.ignore_patterns("reports", "__pycache__"))
     shutil.copytree(place / "examples" / "fivebar", place / "fivebar")
+    shown = (REPOSITORY / "docs" / "robots.md").read_text(encoding="utf-8").split("```toml robot.toml\n")[1]
+    (place / "fivebar" / "robot.toml").write_text(shown.split("```", maxsplit=1)[0], encoding="utf-8")
     sweep = place / "campaigns" / "design_sweep.toml"
     text = sweep.read_text(encoding="utf-8")
     assert text.count("samples = 10000") == 1
