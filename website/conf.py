@@ -27,8 +27,6 @@ html_last_updated_fmt = None
 html_theme_options = {"navigation_with_keys": True}
 # A block without a language is no Python.
 highlight_language = "text"
-pygments_style = "friendly"
-pygments_dark_style = "monokai"
 
 # Headings have GitHub's anchors, and ```math is an equation, as GitHub shows it.
 myst_heading_anchors = 4
