@@ -37,6 +37,10 @@ myst_dmath_double_inline = True
 myst_dmath_allow_space = False
 myst_dmath_allow_digits = False
 
+# --from is an option, and C' a derivative.
+smartquotes = False
+# Single backticks of docstrings are names.
+default_role = "literal"
 autodoc_typehints = "description"
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
