@@ -215,7 +215,8 @@ def test_the_first_five_minutes_go_as_they_are_told(tmp_path: Path) -> None:
     assert "PASSED" in said[0]
     assert "5.90 %" in said[0]
     assert "payload" in said[1]
-    assert "exit code 1" in said[3]
+    assert "NOTHING JUDGED" in said[3]
+    assert "exit code 4" in said[3]
     assert (place / "reports/almeida_2010/report.html").exists()
 
 
