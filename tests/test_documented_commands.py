@@ -31,7 +31,9 @@ ELSEWHERE = {
     r"make (mutants|bench|reports|format)( |$)": "by hand: hours, or they change files; test_mutants.py plans mutants",
     r"python benchmarks/": "by hand: they measure this machine",
     r"pip install ": "test_distribution.py installs the wheel and the source distribution",
-    r"workbench run \S+ --scheduler tcp://head": "test_sweep_run.py, on a cluster of this machine",
+    r"workbench run (\S+ --scheduler tcp://head|campaigns/\S*control\S*\.toml)": (
+        "test_sweep_run.py on a cluster of this machine; the tests of control, in parts of it"
+    ),
     r"dask ssh ": "needs machines to log in to",
     r"workbench model view ": "test_rendering.py, on a virtual screen",
     r"workbench watch ": "test_watch.py, with saved files",
