@@ -28,7 +28,7 @@ MARKS_PER_S = 4.0
 """How often the moment is marked in the curves while the motion plays."""
 SETTLED_S = 0.6
 """A slider that rests so long has been let go: the next change is another step back."""
-CONTROLS, RESULTS = 300, 350
+CONTROLS, RESULTS = 330, 350
 """Widths of the panels, px."""
 
 
@@ -60,7 +60,7 @@ class Page:
         self.worker = Worker(self._fault)
         server.gui.set_panel_label("workbench studio")
         self._theme()
-        self.scene = Scene(server)
+        self.scene = Scene(server, dark)
         self._results_panel()
         self._controls()
         add_keys(self)
@@ -273,8 +273,7 @@ class Page:
                 self._time.max = max(len(good.t) - 1, 1)
             self.scene.show(good, other)
             self.scene.pose(self.sample)
-            before = f"{words.against_words(session)}"
-            self.curves.show(good, other, str(self._quantity.value), before, self._plots)
+            self.curves.show(good, other, str(self._quantity.value), words.against_words(session), self._plots)
             self._key.content = self.curves.key()
             self.curves.mark(self.sample)
             self._head.content = words.head(session)
@@ -353,8 +352,8 @@ class Page:
             with self._lock:
                 t = self.session.good.t
                 moment += passed * self._speed
-                if moment > t[-1]:
-                    moment = float(t[0])
+                if moment > t[-1]:  # over and over; where a busy machine lets more than a whole motion pass, too
+                    moment = float(t[0] + (moment - t[0]) % max(t[-1] - t[0], 1e-9))
                 self.sample = min(int(t.searchsorted(moment)), len(t) - 1)
                 self.scene.pose(self.sample)
                 if now - marked > 1 / MARKS_PER_S:
@@ -374,6 +373,8 @@ class Page:
         self._dark = dark
         self._theme()
         self.curves.in_the(dark)
+        with self._lock:
+            self.scene.in_the(dark)
         self.worker.ask("show", self._show)
 
     # files
