@@ -77,7 +77,7 @@ def torque_label(joint: str, unit: str) -> str:
 
 
 def torque_name(joint: str) -> str:
-    """Name an actuated joint's generalized force without its unit: ``τ2`` of q2, ``τ crank`` of a joint called crank."""
+    """Name the generalized force of an actuated joint: ``τ2`` of q2, ``τ crank`` of a joint called crank."""
     number = _NUMBERED.fullmatch(joint)
     return f"τ{number[1] if number else ' ' + joint}"
 

@@ -21,6 +21,8 @@ FORMULA_COLOURS = ("#e8590c", "#2b8a3e", "#c2255c", "#0b7285", "#a17f00")
 BEFORE_COLOUR = "#868e96"
 NOW_COLOUR = "#e03131"
 HEIGHT = 190
+BELOW: Mapping[str, Any] = {"label": "t [s]", "labelSize": 18, "labelFont": "12px sans-serif", "size": 34}
+"""The axis of time."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,7 @@ class Curves:
              "points": {"show": True, "size": 8, "fill": NOW_COLOUR, "stroke": NOW_COLOUR}},
         ]  # fmt: skip
         return self._gui.add_uplot(
-            data, tuple(series), title=title, height=HEIGHT, axes=({**axis, "label": "t [s]", "labelSize": 18, "labelFont": "12px sans-serif", "size": 34}, {**axis, "size": 62}),
+            data, tuple(series), title=title, height=HEIGHT, axes=({**axis, **BELOW}, {**axis, "size": 62}),
             scales={"x": {"time": False}}, cursor={"sync": {"key": "workbench"}, "drag": {"x": True, "y": False}},
             legend={"show": False}, padding=(4, 12, 0, 0),
         )  # fmt: skip

@@ -13,6 +13,7 @@ import viser
 from workbench.errors import WorkbenchError
 from workbench.robots.assignments import parse_assignment, resolve_changes
 from workbench.studio import words
+from workbench.studio.arrange import Panels
 from workbench.studio.curves import QUANTITIES, Curves
 from workbench.studio.keep import Keep
 from workbench.studio.keys import add_keys
@@ -28,8 +29,6 @@ MARKS_PER_S = 4.0
 """How often the moment is marked in the curves while the motion plays."""
 SETTLED_S = 0.6
 """A slider that rests so long has been let go: the next change is another step back."""
-CONTROLS, RESULTS = 330, 350
-"""Widths of the panels, px."""
 
 
 class Page:
@@ -78,8 +77,6 @@ class Page:
 
     def _results_panel(self) -> None:
         gui: Any = self.server.gui
-        gui.main_panel.dock_right()
-        gui.main_panel.set_width(CONTROLS)
         panel = gui.add_panel()
         with panel.add_tab("Answers"):
             self._head = gui.add_html("")
@@ -89,8 +86,7 @@ class Page:
             self._key = gui.add_html("")
             self._plots = gui.add_folder(None)
             self._verdict, self._peaks, self._poses = gui.add_html(""), gui.add_html(""), gui.add_html("")
-        panel.dock_right()
-        panel.set_width(RESULTS)
+        Panels(self.server, panel)
         self.curves = Curves(gui)
         self.curves.in_the(self._dark)
         self._quantity.on_update(lambda _: self._redraw_curves())
