@@ -23,7 +23,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("studio",),
     ("report", "compare", "rendering"),
     ("control",),
-    ("sweep", "diagnosis", "importing"),
+    ("sweep", "diagnosis", "importing", "library"),
     ("campaign", "workspace"),
     ("capabilities",),
     ("recorded",),

@@ -47,8 +47,9 @@ def torques(p, q, qd, qdd, near, far, cross):
 @workbench.candidate("exact", bound=1e-10, source="examples/delta/README.md")
 def exact(p, q, qd, qdd):
     """Forearms as rods with their own inertia, in the coordinates of their ends."""
-    turning = p.If / p.lz**2
-    return torques(p, q, qd, qdd, p.mf / 4 + turning, p.mf / 4 + turning, p.mf / 4 - turning)
+    k, turning = -p.cf / p.lz, p.If / p.lz**2
+    near, far = p.mf * (1 - k) ** 2 + turning, p.mf * k**2 + turning
+    return torques(p, q, qd, qdd, near, far, p.mf * k * (1 - k) - turning)
 
 
 @workbench.candidate("codourey", source="[Codourey1998]")

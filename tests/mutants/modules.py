@@ -55,7 +55,20 @@ GROUP_TESTS: dict[str, tuple[str, ...]] = {
     "verdict": ("verdict", "compare_case"),
     "comparison": ("verdict", "compare_case"),
     "mjcf": ("mjcf_setup", "mjcf_roundtrip", "mjcf_source", "mjcf_assumptions"),
-    "robots": ("agreement", "body_numbers", "screws", "asym_kernel", "planar_4rprp", "mass_models", "mjcf_roundtrip"),
+    "robots": (
+        "agreement",
+        "body_numbers",
+        "screws",
+        "asym_literal",
+        "planar_4rprp",
+        "mass_models",
+        "mjcf_roundtrip",
+        "robot_file",
+        "mjcf_assumptions",
+        "mjcf_edit",
+        "friction",
+        "errata",
+    ),
     "reference": ("reference_linear", "closure_kinds", "own_reference", "counted_forces", "reference_closure"),
 }
 """The tests of each group that a short run tries, in this order, without knowing who reaches what."""

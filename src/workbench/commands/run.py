@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,9 +12,18 @@ from workbench.commands.assignments import settings
 from workbench.commands.options import CampaignOrNone, OtherModel, SetInCases
 from workbench.errors import SpecError
 
+if TYPE_CHECKING:
+    from workbench.campaign.evidence import Effort
+
 
 def run(
     campaign: CampaignOrNone = None,
+    robots: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="In place of a campaign: check this robot of the library, or all; may be repeated."
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -63,7 +72,7 @@ def run(
         bool,
         typer.Option(
             "--replace",
-            help="Replace an earlier run of another robot, other cases or candidates, or of more evidence.",
+            help="Replace an earlier run of another robot, other cases or candidates, of more evidence, with pictures.",
         ),
     ] = False,
     good: Annotated[
@@ -93,7 +102,6 @@ def run(
     input; 4: nothing was held against a bound, so nothing is judged.
     """
     from workbench.campaign.asked import with_good
-    from workbench.campaign.evidence import Effort
     from workbench.campaign.run import run_campaign
     from workbench.campaign.spec import campaign_names, load_campaign
     from workbench.commands.sweeps import dry_run as print_dry_run
@@ -102,10 +110,24 @@ def run(
     from workbench.sweep.pick import pick_cases
     from workbench.sweep.run import SweepInterrupted, SweepOptions
 
+    if robots:
+        others: dict[str, object] = {
+            "CAMPAIGN": campaign, "--only": only, "--set": set_, "--model": model, "--candidates": candidates,
+            "--dry-run": dry_run, "--keep-going": keep_going, "--good": good, "--jobs": jobs, "--fresh": fresh,
+            "--retry-failed": retry_failed, "--scheduler": scheduler,
+        }  # fmt: skip
+        if beside := [name for name, value in others.items() if value]:
+            raise SpecError(f"--robots {robots[0]}: runs a robot's own campaign as it is, without {beside[0]}")
+        from workbench.commands.run_library import run_library
+
+        code = run_library(robots, out, _effort(engines, quick), ["workbench", *sys.argv[1:]], replace=replace)
+        if code:
+            raise typer.Exit(code)
+        return
     if campaign is None:
         raise SpecError(f"which CAMPAIGN? A TOML file, or one that comes along: {', '.join(campaign_names())}")
     values, relative = settings(set_ or [])
-    effort = Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick)
+    effort = _effort(engines, quick)
     command = ["workbench", *sys.argv[1:]]
     spec, file = load_campaign(campaign)
     if spec.control is not None:
@@ -188,3 +210,9 @@ def run(
         code = outcome.conclusion.exit_code
     if code:
         raise typer.Exit(code)
+
+
+def _effort(engines: str, quick: bool) -> Effort:
+    from workbench.campaign.evidence import Effort
+
+    return Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick)
