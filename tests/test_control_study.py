@@ -12,10 +12,11 @@ import pandas as pd
 import pytest
 
 from small_campaign import Workbench
-from workbench.campaign.control_spec import ControlClaim, ControlSpec
+from workbench.campaign.control_spec import BUILT_IN, ControlClaim, ControlSpec, DelaySpec
 from workbench.campaign.spec import load_campaign
 from workbench.control.claims import HOLDS, REFUTED, UNDECIDED, Known, judged
 from workbench.control.evaluate import Study, compute, evaluate
+from workbench.control.files import ERROR_COLUMNS, LOOP_COLUMNS
 from workbench.control.loop import TRACKED, UNSTABLE
 from workbench.control.plan import Loop, StudyPlan, plan_study
 from workbench.control.sampling import Encoder, Sampling
@@ -245,6 +246,14 @@ def test_claims_about_speed_and_rate() -> None:
     assert verdict_of("faster", at_cost | {(1.0, "printed cost", "lumped"): (5e-4,) * 3}) == HOLDS
     assert verdict_of("faster", at_cost | {(1.0, "printed cost", "lumped"): (2e-3,) * 3}) == REFUTED
     assert verdict_of("faster", exact) == UNDECIDED  # no run at a printed cost
+
+
+def test_every_key_is_documented(repository: Path) -> None:
+    text = (repository / "docs" / "control.md").read_text(encoding="utf-8")
+    keys = {*ControlSpec.model_fields, *ControlClaim.model_fields, *DelaySpec.model_fields}
+    keys |= {*LOOP_COLUMNS, *ERROR_COLUMNS, *BUILT_IN, "ended", "agreed", "spread", "work"} - {"joint"}
+    shown = {key for key in keys if f"`{key}`" in text or f'`"{key}"`' in text or f"`{key} = " in text}
+    assert sorted(keys - shown) == []
 
 
 @pytest.mark.slow
