@@ -32,9 +32,8 @@ ELSEWHERE = {
     r"python benchmarks/": "by hand: they measure this machine",
     r"workbench run --robots all": "make library does, and keeps what it finds; test_library.py runs one robot",
     r"pip install ": "test_distribution.py installs the wheel and the source distribution",
-    r"workbench run (\S+ --scheduler tcp://head|campaigns/\S*control\S*\.toml)": (
-        "test_sweep_run.py on a cluster of this machine; the tests of control, in parts of it"
-    ),
+    r"workbench run \S+ --scheduler tcp://head": "test_sweep_run.py, on a cluster of this machine",
+    r"workbench run campaigns/(almeida_2010_control|control_4rprp)": "minutes; test_control_study.py has small ones",
     r"dask ssh ": "needs machines to log in to",
     r"workbench model view ": "test_rendering.py, on a virtual screen",
     r"workbench watch ": "test_watch.py, with saved files",
