@@ -22,6 +22,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("__main__", "cli", "commands", "console"),
     ("studio",),
     ("report", "compare", "rendering"),
+    ("control",),
     ("sweep", "diagnosis", "importing", "library"),
     ("campaign", "workspace"),
     ("capabilities",),

@@ -1,4 +1,4 @@
-"""What is published installs without a network, works far from the checkout: wheel, source distribution, completion."""
+"""What is published installs without a network and works far from the checkout; so does shell completion."""
 
 from __future__ import annotations
 

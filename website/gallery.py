@@ -6,7 +6,7 @@ import html
 import re
 from pathlib import Path
 
-HEAD = """# Reports
+HEAD = """# Published reports
 
 Each of these is a run's own report as it was written, a page in one file. `make reports` computes all of them again.
 

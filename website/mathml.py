@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from docutils import nodes
 from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
@@ -10,12 +12,15 @@ from sphinx.errors import ExtensionError
 from sphinx.util.math import get_node_equation_number
 from sphinx.writers.html5 import HTML5Translator
 
+ACCENTED = re.compile(r"(\\(?:dot|ddot|bar|hat|tilde|vec) ?(?:\{[^{}]*\}|[A-Za-z]))(?=_)")
+"""docutils takes what has an accent for what has limits and would set an index below it; a larger group is none."""
+
 
 def _mathml(node: nodes.Element, block: bool) -> str:
     text = node.astext()
     try:
         # docutils' entities are HTML's
-        return str(tex2mathml(text.strip(), as_block=block))
+        return str(tex2mathml(ACCENTED.sub(r"{\1{}}", text.strip()), as_block=block))
     except MathError as error:
         raise ExtensionError(f"{node.source or ''}:{node.line or ''}: no MathML for {text!r}: {error}") from error
 

@@ -8,7 +8,10 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+from markdown_it import MarkdownIt
+
 from website import command_line, gallery, python_api, robot_pages, schema_pages
+from website.equations import UnreadableError, equations
 from website.pages_of import Section, repository_pages, sections
 
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^()\s]+)\)")
@@ -48,13 +51,20 @@ def stage(repository: Path, source: Path, extra: Path) -> None:
     website = Path(__file__).resolve().parent
     index = (website / "pages" / "index.md").read_text(encoding="utf-8")
     texts["index"] = index + _toctrees(sections(website, tuple(page for page in texts if page != "index")))
-    dead: list[str] = []
+    dead = _dead_in_readme(repository)
     for page, text in texts.items():
         target = source / f"{page}.md"
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(_linked(text, page, repository, source, set(texts), dead), encoding="utf-8")
     if dead:
         raise DeadLinkError("\n".join(dead))
+
+
+def _dead_in_readme(repository: Path) -> list[str]:
+    """Dead links of README.md, which is no page of the site."""
+    targets = (match[2] for match in LINK.findall((repository / "README.md").read_text(encoding="utf-8")))
+    paths = (target.partition("#")[0] for target in targets if not re.match(r"[a-z]+:", target))
+    return [f"README.md: dead link {path}" for path in paths if path and not (repository / path).exists()]
 
 
 def _toctrees(found: tuple[Section, ...]) -> str:
@@ -95,9 +105,23 @@ def _linked(text: str, page: str, repository: Path, source: Path, pages: set[str
         return match[0]
 
     lines, fence = [], ""
-    for line in text.splitlines():
+    for line in _with_equations(text).splitlines():
         mark = FENCE.match(line)
         if mark and (not fence or line.strip() == fence):
             fence = "" if fence else mark[1]
         lines.append(line if fence or mark or line.startswith("    ") else LINK.sub(followed, line))
     return "\n".join(lines) + "\n"
+
+
+def _with_equations(text: str) -> str:
+    """Give the page with its indented equations set; blocks that are none stay as they are."""
+    lines = text.splitlines()
+    for token in reversed(MarkdownIt("commonmark").parse(text)):
+        if token.type == "code_block" and token.level == 0 and token.map:
+            try:
+                tex = equations(token.content)
+            except UnreadableError:
+                continue
+            first, last = token.map
+            lines[first:last] = ["```math", *tex.splitlines(), "```", ""]
+    return "\n".join(lines)

@@ -43,6 +43,12 @@ def run(
             help="File with formulas of your own, which is run: .py .m .c .so .jl .R or a program; may be repeated.",
         ),
     ] = None,
+    controllers: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE", help="Python file with controllers of your own for [control], run; may be repeated."
+        ),
+    ] = None,
     engines: Annotated[
         str, typer.Option(metavar="LIST", help="mujoco, or mujoco,pinocchio to check the reference by a second engine.")
     ] = "mujoco",
@@ -124,6 +130,33 @@ def run(
     effort = _effort(engines, quick)
     command = ["workbench", *sys.argv[1:]]
     spec, file = load_campaign(campaign)
+    if spec.control is not None:
+        from workbench.commands.studies import refuse_options, run_study_and_print
+
+        given = {"only": only, "dry_run": dry_run, "good": good, "relative": relative, "scheduler": scheduler}
+        given |= {"quick": quick, "keep_going": keep_going, "engines": engines != "mujoco"}
+        refuse_options(str(campaign), **given)
+        try:
+            code = run_study_and_print(
+                spec,
+                file,
+                out,
+                model=model,
+                settings=values,
+                command=command,
+                options=SweepOptions(jobs, None, fresh, retry_failed, replace),
+                candidates=candidates or (),
+                controllers=controllers or (),
+                report=report_apart,
+            )
+        except SweepInterrupted as stop:
+            typer.echo(f"workbench: {stop}", err=True)
+            raise
+        if code:
+            raise typer.Exit(code)
+        return
+    if controllers:
+        raise SpecError(f"{campaign}: --controllers {controllers[0]}: the campaign has no [control]")
     sweep = spec.sweep is not None and not only
     if relative and (sweep or dry_run):
         raise SpecError(f"{campaign}: --set NAME*=FACTOR does not go with {'--dry-run' if dry_run else 'a sweep'}")

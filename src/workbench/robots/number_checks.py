@@ -37,6 +37,10 @@ class Products:
             self._of[: len(target.of), column] = [place[name] for name in target.of]
         self._factors = np.array([target.factor for target in targets])
 
+    def moved(self, changed: np.ndarray) -> np.ndarray:
+        """Which numbers ``(k,)`` a change of some parameters ``(names,)`` moves."""
+        return np.asarray(np.append(changed, False)[self._of].any(axis=0))
+
     def __call__(self, values: Mapping[str, float]) -> FloatArray:
         """Numbers ``(k,)``."""
         numbers = np.array([*(values[name] for name in self._names), 1.0])

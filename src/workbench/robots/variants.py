@@ -71,12 +71,13 @@ class Variants:
 class _Number:
     """One number in a specification."""
 
+    owner: tuple[str, str]
+    """tag and name of the element"""
     element: Any
     field: str
     index: int
     size: int
     """of the field; 0 for a plain number"""
-    before: float
 
 
 class _Numbers:
@@ -87,37 +88,36 @@ class _Numbers:
         assert described is not None
         assert values is not None
         self.spec = spec
-        self._targets: list[Target] = []
-        self._numbers: list[_Number] = []
-        self._signs: list[float] = []
-        for target in described.targets:
-            found = _place(base, spec, target)
-            if found is not None:
-                self._targets.append(target)
-                self._numbers.append(found[0])
-                self._signs.append(found[1])
-        names = tuple(described.table.infos)
-        self._products = Products(self._targets, names)
-        self._moves = [np.array([names.index(n) for n in t.of]) for t in self._targets]
-        self._was = np.array([values[n] for n in names])
-        self._names = names
+        found = [(target, _place(base, spec, target)) for target in described.targets]
+        placed = [(target, *place) for target, place in found if place is not None]
+        self._names = tuple(described.table.infos)
+        self._products = Products([target for target, _, _ in placed], self._names)
+        self._signs = np.array([sign for _, _, sign in placed])
+        self._was = np.array([values[name] for name in self._names])
+        self._fields: list[tuple[Any, str, FloatArray, list[int], list[int]]] = []
+        """element, field, its vector in the file, and which number stands where in it"""
+        places: dict[tuple[tuple[str, str], str], int] = {}
+        for column, (_, number, _) in enumerate(placed):
+            key = number.owner, number.field
+            if key not in places:
+                places[key] = len(self._fields)
+                now = np.atleast_1d(np.array(getattr(number.element, number.field), dtype=np.float64))
+                self._fields.append((number.element, number.field, now, [], []))
+            field = self._fields[places[key]]
+            field[3].append(column)
+            field[4].append(number.index)
+        self._plain = {field for _, number, _ in placed for field in [number.field] if not number.size}
 
     def put(self, wanted: Mapping[str, float]) -> None:
-        """Replace the numbers."""
-        products = self._products(wanted).tolist()
-        moved = np.array([wanted[name] for name in self._names]) != self._was
-        vectors: dict[tuple[int, str], tuple[Any, list[float]]] = {}
-        for number, sign, product, of in zip(self._numbers, self._signs, products, self._moves, strict=True):
-            value = sign * product if moved[of].any() else number.before
-            if not number.size:
-                setattr(number.element, number.field, value)
-                continue
-            key = id(number.element), number.field
-            if key not in vectors:
-                vectors[key] = number.element, list(getattr(number.element, number.field))
-            vectors[key][1][number.index] = value
-        for (_, name), (element, values) in vectors.items():
-            setattr(element, name, values)
+        """Replace the numbers; where no parameter of a number changes, it is the file's own."""
+        moved = self._products.moved(np.array([wanted[name] for name in self._names]) != self._was).tolist()
+        numbers = (self._signs * self._products(wanted)).tolist()
+        for element, name, before, columns, places in self._fields:
+            now = before.copy()
+            for column, place in zip(columns, places, strict=True):  # of two that move one number the last counts
+                if moved[column]:
+                    now[place] = numbers[column]
+            setattr(element, name, now if name not in self._plain else float(now[0]))
 
 
 def _place(base: Base, spec: mujoco.MjSpec, target: Target) -> tuple[_Number, float] | None:
@@ -145,14 +145,14 @@ def _place(base: Base, spec: mujoco.MjSpec, target: Target) -> tuple[_Number, fl
     if "&" in found[index][2]:
         raise LookupError(target.words)
     element, spelt = place
-    holder = _element(spec, element.tag, element.body if element.tag == "geom" and not element.name else target.name)
+    owner = element.tag, element.body if element.tag == "geom" and not element.name else target.name
+    holder = _element(spec, *owner)
     if holder is None:
         raise LookupError(target.words)
     name = FIELDS.get((element.tag, spelt), spelt)
     now = getattr(holder, name)
     size = int(np.size(now)) if np.ndim(now) else 0
-    before = float(np.asarray(now).reshape(-1)[index])
-    return _Number(holder, name, index, size, before), sign
+    return _Number(owner, holder, name, index, size), sign
 
 
 def _element(spec: mujoco.MjSpec, tag: str, name: str) -> Any:
