@@ -53,7 +53,7 @@ def manifest(workbench: Workbench, run: str = "reports/small") -> dict[str, Any]
 
 
 def summary(workbench: Workbench, run: str = "reports/small") -> pd.DataFrame:
-    return pd.read_csv(workbench.directory / run / "summary.csv")
+    return pd.read_csv(workbench.directory / run / "summary.csv", float_precision="round_trip")
 
 
 def series(workbench: Workbench, case: str, run: str = "reports/small") -> pd.DataFrame:

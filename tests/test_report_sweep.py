@@ -387,7 +387,11 @@ def test_a_sweep_ends_with_its_report_and_one_design_can_be_run_alone(workbench:
     assert f"--only {worst}" in (many / "report.md").read_text(encoding="utf-8")
     alone = workbench.run(FEW, "--quick", "--only", worst, "--out", "one")
     assert alone.code == 0
-    one = pd.read_csv(workbench.directory / "one" / "summary.csv").set_index(["candidate", "joint"]).peak_error
+    one = (
+        pd.read_csv(workbench.directory / "one" / "summary.csv", float_precision="round_trip")
+        .set_index(["candidate", "joint"])
+        .peak_error
+    )
     same = rows[rows.case == worst].set_index(["candidate", "joint"]).peak_error
     pd.testing.assert_series_equal(one[same.index], same, check_exact=True)
     other = rows[rows.case != worst].groupby("case").get_group(rows.case[rows.case != worst].iloc[0])

@@ -51,16 +51,18 @@ def _text(frame: pd.DataFrame) -> bytes:
 def _summary(run: RunFrames) -> pd.DataFrame:
     """One row per case, candidate, joint and figure, each with its unit."""
     keys = ["case", "candidate", "reference", "joint", "kind", "verdict"]
-    pieces = []
-    for name in (*RATIOS, "worst_time_s", "peak_reference", "normaliser"):
-        piece = run.summary[keys].copy()
-        piece["quantity"] = name.removesuffix("_s")
-        piece["value"] = run.summary[name]
+    names, summary = (*RATIOS, "worst_time_s", "peak_reference", "normaliser"), run.summary
+    units: list[str] = []
+    for name in names:
         by_joint = name in ("peak_reference", "normaliser")
-        unit = [run.manifest.unit_of(j) for j in run.summary["joint"]] if by_joint else "1" if name in RATIOS else "s"
-        piece["unit"] = unit
-        pieces.append(piece)
-    return pd.concat(pieces, ignore_index=True)
+        of_all = ["1" if name in RATIOS else "s"] * len(summary)
+        units += [run.manifest.unit_of(j) for j in summary["joint"]] if by_joint else of_all
+    # by arrays: some versions of pandas warn of pieces that hold nothing but gaps
+    frame = pd.concat([summary[keys]] * len(names), ignore_index=True)
+    frame["quantity"] = np.repeat([name.removesuffix("_s") for name in names], len(summary))
+    frame["value"] = np.concatenate([summary[name].to_numpy() for name in names])
+    frame["unit"] = units
+    return frame
 
 
 def _tidy(series: pd.DataFrame) -> pd.DataFrame:

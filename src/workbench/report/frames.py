@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 
 from workbench.campaign.conclusion import Conclusion
@@ -79,15 +80,18 @@ class RunFrames:
             As `series`.
         """
         wide = self.series(case)
-        pieces = []
-        for column in wide.columns:
-            found = self._torque(str(column))
-            if found:
-                kind, name, joint = found
-                pieces.append(
-                    pd.DataFrame({"t": wide["t"], "joint": joint, "kind": kind, "name": name, "value": wide[column]})
-                )
-        frame = pd.concat(pieces, ignore_index=True)
+        torques = {str(column): found for column in wide.columns if (found := self._torque(str(column)))}
+        kinds, names, joint_names = zip(*torques.values(), strict=True)
+        # by arrays: some versions of pandas warn of pieces in which a failed formula left nothing but gaps
+        frame = pd.DataFrame(
+            {
+                "t": np.tile(wide["t"].to_numpy(), len(torques)),
+                "joint": np.repeat(joint_names, len(wide)),
+                "kind": np.repeat(kinds, len(wide)),
+                "name": np.repeat(names, len(wide)),
+                "value": wide[list(torques)].to_numpy().T.ravel(),
+            }
+        )
         joints = zip(self.manifest.joints, self.manifest.force_units, strict=True)
         frame.attrs = {"case": case, "units": {"t": "s", "value": dict(joints)}}
         return frame
