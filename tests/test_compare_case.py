@@ -174,6 +174,10 @@ def test_rows_facts_and_columns_are_those_of_the_python_interface(tmp_path: Path
     assert evidence["replay"]["candidates"]["distributed"]["verdict"] == "converges"
     assert found.qpos is not None
     np.testing.assert_array_equal(found.qpos, first.qpos)
+    for i in (1, 2, 3):  # what the torque is spent on, of the first mass model
+        parts = [values for name, values in series.items() if name.startswith("part_") and name.endswith(f"_q{i}")]
+        assert len(parts) > 2
+        np.testing.assert_allclose(sum(parts), first.tau[:, i - 1], atol=1e-10)
 
 
 @pytest.mark.parametrize("name", ["q1", "q3"])

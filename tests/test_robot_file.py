@@ -77,3 +77,11 @@ def test_a_mistake_is_refused_in_one_line(workbench: Workbench, name: str) -> No
 def test_the_file_itself_is_right(workbench: Workbench) -> None:
     """The twin: every mistake above is one."""
     assert workbench("run", "slider.toml", "--dry-run").code == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "factor", "names"),
+    [("k1 * a1", 1.0, ("k1", "a1")), ("+k1*a1", 1.0, ("k1", "a1")), ("- a1", -1.0, ("a1",)), ("-0.5 * a1", -0.5, ("a1",))],
+)  # fmt: skip
+def test_signs_and_factors_of_a_place(text: str, factor: float, names: tuple[str, ...]) -> None:
+    assert _product(text, "here") == (factor, names)
