@@ -8,6 +8,7 @@ import pytest
 
 from slider_crank import ROBOT, write_slider
 from small_campaign import Workbench
+from workbench.robots.places import _product
 
 MISTAKES = {
     "unknown key": ("actuated =", "actuatd =", ("actuatd: unknown key", 'did you mean "actuated"')),
@@ -81,7 +82,8 @@ def test_the_file_itself_is_right(workbench: Workbench) -> None:
 
 @pytest.mark.parametrize(
     ("text", "factor", "names"),
-    [("k1 * a1", 1.0, ("k1", "a1")), ("+k1*a1", 1.0, ("k1", "a1")), ("- a1", -1.0, ("a1",)), ("-0.5 * a1", -0.5, ("a1",))],
+    [("k1 * a1", 1.0, ("k1", "a1")), ("+k1*a1", 1.0, ("k1", "a1")), ("- a1", -1.0, ("a1",)),
+     ("-0.5 * a1", -0.5, ("a1",))],
 )  # fmt: skip
 def test_signs_and_factors_of_a_place(text: str, factor: float, names: tuple[str, ...]) -> None:
     assert _product(text, "here") == (factor, names)
