@@ -172,6 +172,27 @@ def test_both_routes_agree_and_do_not_when_one_has_other_masses(robot: wb.Robot)
         assert (off < 0.1 * error) is agrees
 
 
+def test_both_routes_agree_under_a_force(robot: wb.Robot) -> None:
+    force = np.array([20.0, -15.0, 40.0])
+    course = sine(robot.home, np.array([0.05, 0.2, 0.2]), np.array([8.0, 17.0, 23.0]))
+    desired = desired_at_ticks(course, 0.0, 0.1, 1000.0)
+
+    def run(plant: Plant | StiffPlant, known: FloatArray, step: float) -> Tracked:
+        model, gains = FormulaModel(robot, "distributed", known), Gains(10.0, 1.0, np.ones(3))
+        return run_loop(plant, law_of("computed torque", model, gains, desired), desired, ideal(1000.0, 3), step)
+
+    one, stiff = run(Plant(robot.reference, force), force, 1e-3), StiffPlant(robot.reference, force)
+    found = []
+    for step in (2.5e-4, 1.25e-4):
+        stiff.stiffen(step)
+        found.append(run(stiff, force, step))
+    error = float(np.abs(one.q - desired.q).max())
+    assert np.abs(2.0 * found[1].q - found[0].q - one.q).max() < 0.1 * error
+    assert np.abs(2.0 * found[1].x - found[0].x - one.x).max() < 0.1 * error
+    # the twin: a model that is not told the force errs by what the force is worth
+    assert np.abs(run(Plant(robot.reference, force), np.zeros(3), 1e-3).q - desired.q).max() > 10.0 * error
+
+
 def test_a_delay_is_served_in_parts_of_a_period(tmp_path: Path) -> None:
     """Under a torque that is a function of time alone, 1.5 periods of delay move a step of it by as much."""
     reference = reference_of(tmp_path, PENDULUM, "swing", "tip", swing=0.4)

@@ -151,6 +151,8 @@ def run_campaign(
         if out is not None
         else Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
     )
+    if campaign.control:
+        raise SpecError(f"{file}: has [control]; workbench run, or workbench.control.run.run_study, runs it")
     users = load_candidates(candidates)
     own = {candidate.name for candidate in campaign.candidate}
     campaign = with_good(with_rows(campaign, users), good)

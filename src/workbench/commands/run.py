@@ -133,7 +133,9 @@ def run(
     if spec.control is not None:
         from workbench.commands.studies import refuse_options, run_study_and_print
 
-        refuse_options(str(campaign), only=only, dry_run=dry_run, good=good, relative=relative, scheduler=scheduler)
+        given = {"only": only, "dry_run": dry_run, "good": good, "relative": relative, "scheduler": scheduler}
+        given |= {"quick": quick, "keep_going": keep_going, "engines": engines != "mujoco"}
+        refuse_options(str(campaign), **given)
         try:
             code = run_study_and_print(
                 spec,

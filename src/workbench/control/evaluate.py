@@ -42,6 +42,12 @@ half changes errors by less than a millionth (measured), and MuJoCo's route alon
 
 NOT_RUN = "not run"
 
+LISTS = ("controllers", "models", "rates", "highest_rate", "bandwidths", "speeds")
+"""What a study is a product of: a run knows its own, and a study that grows keeps what it has."""
+
+JUDGING = ("claim", "wanted", "enough", "time_limit", "memory_limit", "retries")
+"""What changes no number of a run."""
+
 STIFF_STEP = 2.5e-4
 """s: the second route's coarse step, or the control period."""
 
@@ -308,7 +314,7 @@ def study_key(
         plan.campaign, plan.file, plan.model, settings, Effort.of_many(("mujoco",), False), "none", users
     )
     content = {
-        "control": plan.spec.model_dump(exclude={"claim", "wanted", "enough", "time_limit", "memory_limit", "retries"}),
+        "control": plan.spec.model_dump(exclude=set(LISTS + JUDGING)),
         "actuators": torque_limits(plan.campaign, plan.robot),
         "cases": [case.model_dump(exclude={"title", "description"}) for case in plan.campaign.case],
         "controllers": {one.name: one.file.read_text(encoding="utf-8", errors="replace") for one in own},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ from workbench.sweep.identity import case_key
 from workbench.sweep.journal import NAME as JOURNAL
 from workbench.sweep.journal import Journal
 from workbench.sweep.progress import Meter, Show
-from workbench.sweep.record import GOOD, Record, lost
+from workbench.sweep.record import GOOD, Record, lost, parse_line
 from workbench.sweep.run import SYNC_EVERY_S, SweepInterrupted, SweepOptions, cores
 from workbench.sweep.supervisor import Supervisor
 
@@ -94,8 +94,8 @@ def run_study(
     with locked(directory):
         try:
             _prepare(directory, campaign.name, request, options)
+            study_files.write_journal(directory, _still_valid(directory, plan, common, options.retry_failed))
             with Journal(directory / JOURNAL, len(plan.loops)) as journal:
-                _forget(journal, plan, common, options.retry_failed)
                 computed = _compute(context, plan, journal, directory, options, show)
                 records = study_files.read_all(journal, len(plan.loops))
             study_files.write_journal(directory, records)
@@ -146,13 +146,19 @@ def _prepare(directory: Path, name: str, request: Mapping[str, Any], options: Sw
     (directory / store.MANIFEST).unlink(missing_ok=True)
 
 
-def _forget(journal: Journal, plan: StudyPlan, common: str, retry_failed: bool) -> None:
-    """Count a run as not finished unless all that determines it is the same."""
-    for index, loop in enumerate(plan.loops):
-        if index in journal:
-            record = journal.read(index)
-            if record.key != case_key(common, vars(loop)) or (retry_failed and record.status not in GOOD):
-                journal.forget(index)
+def _still_valid(directory: Path, plan: StudyPlan, common: str, retry_failed: bool) -> list[Record]:
+    """Finished runs of which all that determines them is the same, wherever in the study they now stand."""
+    path = directory / JOURNAL
+    if not path.exists():
+        return []
+    known = {}
+    with path.open("rb") as stream:
+        for line in stream:
+            record = parse_line(line)
+            if record is not None and not (retry_failed and record.status not in GOOD):
+                known[record.key] = record
+    keys = enumerate(case_key(common, vars(loop)) for loop in plan.loops)
+    return [replace(known[key], index=index) for index, key in keys if key in known]
 
 
 def _compute(

@@ -30,11 +30,12 @@ class StiffPlant:
         self.reference = reference
         self._force = np.zeros(3) if external_force is None else np.array(external_force, dtype=np.float64)
         structure = reference.structure
-        pull = None
+        pull, name = None, reference.compiled().site(structure.platform_site).name
         if self._force.any():
-            name = reference.compiled().site(structure.platform_site).name
             pull = name, reference.base_rotation @ self._force
         self._model = near_rigid(reference.spec(), 1e-3, pull)
+        # what pulls brings a site of its own, so numbers are others
+        self._site = self._model.site(name).id if name else structure.platform_site
         self._data = mujoco.MjData(self._model)
         self._actuated, self._actuated_qpos = structure.actuated, structure.actuated_qpos
 
@@ -52,7 +53,7 @@ class StiffPlant:
     def platform(self) -> FloatArray:
         """The platform's site ``(3,)``, m, base frame."""
         mujoco.mj_kinematics(self._model, self._data)
-        site = np.asarray(self._data.site_xpos[self.reference.structure.platform_site])
+        site = np.asarray(self._data.site_xpos[self._site])
         found: FloatArray = (site - self.reference.base_position) @ self.reference.base_rotation
         return found
 
