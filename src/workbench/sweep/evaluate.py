@@ -47,6 +47,26 @@ class Answer:
     record: Record
     series: bytes | None = None
 
+    def packed(self) -> Packed:
+        """What the process that writes needs of it."""
+        return Packed(self.record.index, self.record.status, self.record.line(), self.series)
+
+
+@dataclass(frozen=True)
+class Packed:
+    """An answer as it travels: the worker makes the journal's line, so that the one process that writes only writes."""
+
+    index: int
+    status: str
+    line: bytes
+    """`Record.line`"""
+    series: bytes | None = None
+
+
+def compute(context: Context, base: Robot, task: Task) -> Packed:
+    """`evaluate`, packed."""
+    return evaluate(context, base, task).packed()
+
 
 @dataclass(frozen=True)
 class Context:
@@ -69,7 +89,7 @@ class Context:
         assert self.campaign.sweep is not None
         return self.campaign.sweep.keep_series
 
-    def setup(self) -> Callable[[Task], Answer]:
+    def setup(self) -> Callable[[Task], Packed]:
         """Check that this process would give the same numbers as the one that asks, and return what computes a task.
 
         Raises
@@ -84,7 +104,7 @@ class Context:
         base = base_robot(self.campaign, self.file, self.model, users)[0]
         with contextlib.suppress(WorkbenchError):
             self._warm_up(base)
-        return partial(evaluate, self, base)
+        return partial(compute, self, base)
 
     def overrides(self, robot: Robot, spec: CaseSpec) -> dict[str, float]:
         """Parameters of a case, over those of the campaign and under those of the command line."""
