@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from workbench.campaign.cases import Case, base_robot, resolve_case
 from workbench.campaign.compare import CaseResult, Row, compute_case
@@ -164,6 +163,8 @@ def evaluate(context: Context, base: Robot, task: Task) -> Answer:
 
 def series_bytes(result: CaseResult) -> bytes:
     """Return the time series as they stand in ``series/<case>.parquet``; the same numbers give the same bytes."""
+    import pandas as pd  # heavy, and most sweeps keep none
+
     buffer = io.BytesIO()
     pd.DataFrame(dict(result.series)).to_parquet(buffer, index=False)
     return buffer.getvalue()
