@@ -133,6 +133,17 @@ class MujocoReference(PlatformSide):
         return self._structure
 
     @property
+    def closer(self) -> LoopCloser:
+        """What closes the loops, by the same rules for whoever moves the mechanism."""
+        return self._closer
+
+    @property
+    def base_position(self) -> FloatArray:
+        """``(3,)`` origin of the paper's frame, m, world."""
+        found: FloatArray = self._base_position.copy()
+        return found
+
+    @property
     def base_rotation(self) -> FloatArray:
         """``(3, 3)``: world vector = base_rotation @ vector in the paper's frame."""
         return self._base_rotation.copy()

@@ -17,7 +17,10 @@ from markupsafe import Markup, escape
 
 from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
+from workbench.report import kept_drawings
 from workbench.report.bibliography import NAME, bibliography, cited_keys
+from workbench.report.control.load import StudyRun, load_study
+from workbench.report.control.sections import study_sections
 from workbench.report.cost import cost_table
 from workbench.report.drawing import Show, draw
 from workbench.report.latex import latex_table
@@ -84,8 +87,11 @@ def build_report(
     _check_choice("paper", [paper], PAPERS)
     run_dir = Path(run_dir)
     manifest = read_manifest(run_dir)
-    run: Run | SweepRun
-    if manifest.sweep is None:
+    run: Run | SweepRun | StudyRun
+    if manifest.control is not None:
+        run = load_study(run_dir, manifest)
+        sections = study_sections(run)
+    elif manifest.sweep is None:
         run = load_run(run_dir)
         sections = build_sections(run)
     else:
@@ -94,8 +100,9 @@ def build_report(
     with figure_style(style), _few_collections():
         files = _rendered(run, sections, formats, style, paper, show, second)
     wanted = tuple(name for name in formats if name in DATA_FORMATS)
-    if wanted and manifest.sweep is not None:
-        raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; a sweep's data are Parquet")
+    if wanted and not isinstance(run, Run):
+        kind = "a sweep's" if isinstance(run, SweepRun) else "a study's"
+        raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; {kind} data are Parquet")
     if wanted:
         from workbench.report.data_out import data_files  # pandas takes longer to load than a page to write
 
@@ -125,7 +132,7 @@ def _check_choice(what: str, given: Sequence[str], allowed: Iterable[str]) -> No
 
 
 def _rendered(
-    run: Run | SweepRun,
+    run: Run | SweepRun | StudyRun,
     sections: list[Section],
     formats: Sequence[str],
     style: str,
@@ -138,19 +145,27 @@ def _rendered(
         from workbench.report.pdf import all_tables, figure_pdf, report_pdf  # Typst is loaded where it is needed
     figures = run.directory / FIGURES
     plots = [plot for section in sections for plot in section.plots]
-    if {"html", "md", "pdf"} & {*formats}:
-        draw(plots, show, second=second)
-    for plot in plots:
+    steps = _Steps(show, len(plots) * (2 if "pdf" in formats else 1) + ("pdf" in formats))
+    # a page takes no drawing from a file: what stands in it can be read by the page's script
+    kept = not {"html", "md"} & {*formats} and isinstance(run, Run)
+    kept = kept and kept_drawings.take(figures, run.directory, style, plots)
+    if {"html", "md", "pdf"} & {*formats} and not kept:
+        draw(plots, steps.to, second=second)
+    for number, plot in enumerate(plots, 1):
         if "md" in formats:
             files[figures / f"{plot.key}.svg"] = standalone(plot.svg, plot.alt).encode()
         if "pdf" in formats:
             files[figures / f"{plot.key}.pdf"] = figure_pdf(plot, style)
+            steps.to(len(plots) + number)
     if "md" in formats:
         files[run.directory / "report.md"] = render_markdown(run, sections).encode()
+        if isinstance(run, Run):
+            files[run.directory / kept_drawings.NAME] = kept_drawings.note(run.directory, style, files)
     if "html" in formats:
         files[run.directory / "report.html"] = render_html(run, sections).encode()
     if "pdf" in formats:
         files[run.directory / "report.pdf"] = report_pdf(run, sections, style, paper)
+        steps.to(steps.total)
         costs = cost_table(run.manifest)
         tables = [*all_tables(sections), *([costs] if costs else [])]
         if isinstance(run, Run):
@@ -161,7 +176,19 @@ def _rendered(
     return files
 
 
-def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
+class _Steps:
+    """Tells how many figures are drawn and set, and whether the pages are, of all that is to be done."""
+
+    def __init__(self, show: Show | None, total: int) -> None:
+        self._show, self.total = show, total
+
+    def to(self, done: int, _: int = 0) -> None:
+        """So many are done."""
+        if self._show:
+            self._show(done, self.total)
+
+
+def render_html(run: Run | SweepRun | StudyRun, sections: list[Section]) -> str:
     """Return the whole page."""
     return html_page("report.html.j2", sections, _head(run))
 
@@ -190,7 +217,7 @@ def html_page(template: str, sections: Sequence[Section], head: Mapping[str, Any
     return _without_blank_lines(text)
 
 
-def _head(run: Run | SweepRun) -> dict[str, Any]:
+def _head(run: Run | SweepRun | StudyRun) -> dict[str, Any]:
     """What stands over the sections."""
     return {
         "manifest": run.manifest,
@@ -214,7 +241,7 @@ def _without_blank_lines(text: str) -> str:
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip()) + "\n"
 
 
-def render_markdown(run: Run | SweepRun, sections: list[Section]) -> str:
+def render_markdown(run: Run | SweepRun | StudyRun, sections: list[Section]) -> str:
     """Return the report as Markdown that shows figures/*.svg."""
     environment = _environment()
     environment.finalize = finalize_markdown

@@ -166,7 +166,7 @@ def series_bytes(result: CaseResult) -> bytes:
     import pandas as pd  # heavy, and most sweeps keep none
 
     buffer = io.BytesIO()
-    pd.DataFrame(dict(result.series)).to_parquet(buffer, index=False)
+    pd.DataFrame(dict(result.series)).to_parquet(buffer, index=False, write_page_checksum=True)
     return buffer.getvalue()
 
 
