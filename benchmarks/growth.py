@@ -1,6 +1,6 @@
 """How cost grows: samples, joints, loops, candidates, cases, workers; exponents by least squares of logarithms.
 
-    python benchmarks/growth.py [--quick] [--figure docs/images/growth.svg]
+    python benchmarks/growth.py [--quick] [--figure growth.svg]
 
 CPU time, least of some calls, since others may use the machine; each size in a process of its own, whose peak memory
 beyond that of the smallest one stands beside. Prints tables in Markdown.
@@ -76,7 +76,7 @@ def reference_seconds(text: str, samples: int) -> float:
 
 
 def candidates_seconds(count: int) -> float:
-    """One case of 501 samples with so many candidates."""
+    """One case of the paper's campaign with so many candidates."""
     from workbench.campaign.candidate_spec import CandidateSpec
     from workbench.campaign.cases import resolve_cases
     from workbench.campaign.compare import compute_case
