@@ -4,6 +4,7 @@
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DOCS_STAMP := $(VENV)/.docs-installed
 UV := $(shell command -v uv 2>/dev/null)
 # The first of these that is new enough makes the environment.
 PYTHON ?= python3.13 python3.12 python3.11 python3
@@ -13,6 +14,9 @@ SLOW ?=
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 MUTANTS_ARGS ?=
+FLOORS_TESTS ?= $(patsubst %,tests/test_%.py,campaign_run campaign_spec case_figures cli closure_kinds compare_page data_files delimited \
+  edited_runs mjcf_roundtrip mjcf_setup pinocchio_reference portable recorded reference_closure rendering report_formats \
+  report_pictures statements studio_session sweep_run urdf)
 # Campaigns whose reports are kept in reports/published.
 PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models design_sweep
 
@@ -20,7 +24,7 @@ PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_model
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports bench lint format clean
+.PHONY: help setup run test test-slow test-long test-browser test-floors mutants reports library docs bench lint format clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -66,7 +70,8 @@ test-long: $(STAMP) ## Run the tests that take many minutes, by hand: all bad in
 test-browser: $(STAMP) ## Run the tests that open a report in Chromium
 	$(BIN)/pytest -n 2 -m browser $(PYTEST_ARGS)
 
-# The lowest versions that pyproject.toml allows, in an environment of their own; some minutes, so not among the other tests.
+# The lowest versions that pyproject.toml allows, in an environment of their own, with machine code of its own; some minutes,
+# so not among the other tests. Not all of the fast tests but those that use each dependency; FLOORS_TESTS=tests runs all.
 # What old libraries use of newer ones that is to go there some day is theirs: no error here.
 test-floors: $(STAMP) ## Run the tests with the lowest versions of all dependencies
 	@mkdir -p build && $(BIN)/python tests/floors.py > build/floors.txt
@@ -76,7 +81,7 @@ ifneq ($(UV),)
 else
 	@$(VENV)-floors/bin/python -m pip install --quiet --disable-pip-version-check --constraint build/floors.txt --editable '.[dev]'
 endif
-	$(VENV)-floors/bin/pytest -n 2 --dist worksteal -W ignore::DeprecationWarning $(PYTEST_ARGS)
+	NUMBA_CACHE_DIR=$(abspath build/floors-kernels) $(VENV)-floors/bin/pytest -n 2 --dist worksteal -W ignore::DeprecationWarning $(FLOORS_TESTS) $(PYTEST_ARGS)
 
 # Hours where CPU is scarce; what was tried is kept in build/mutants, so that it can be stopped and gone on with.
 mutants: $(STAMP) ## Plant small faults in the core modules and see which no test notices (MUTANTS_ARGS=--help)
@@ -90,6 +95,7 @@ reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings i
 	    $(BIN)/workbench run campaigns/$$name.toml --quick --out $$drawn >/dev/null || exit 1; \
 	    if [ -f $$drawn/pictures/film.webp ]; then mkdir -p $$kept; cp -R $$drawn/pictures $$kept/pictures; fi; \
 	  fi; \
+	  rm -rf $$built/pictures; \
 	  $(BIN)/workbench run campaigns/$$name.toml --no-pictures --out $$built || exit 1; \
 	  if [ -d $$kept/pictures ]; then \
 	    cp -R $$kept/pictures $$built/pictures && $(BIN)/workbench report $$built >/dev/null || exit 1; \
@@ -98,6 +104,21 @@ reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings i
 	  mkdir -p $$kept; \
 	  cp -R $$built/report.html $$built/report.md $$built/figures $$kept || exit 1; \
 	done
+
+$(DOCS_STAMP): $(STAMP)
+	@echo "setting up $(VENV) for the documentation"
+ifneq ($(UV),)
+	@"$(UV)" pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[docs]'
+else
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
+endif
+	@touch $@
+
+docs: $(DOCS_STAMP) ## Build the documentation site into build/site/html; warnings and dead links are errors
+	@$(BIN)/python -m website
+
+library: $(STAMP) ## Check the library of robots and rebuild examples/library.json and docs/library.md
+	$(BIN)/python benchmarks/library.py
 
 bench: $(STAMP) ## Measure speed, as ratios in one run (BENCH_ARGS=--quick to try it); results in benchmarks/results
 	$(BIN)/python benchmarks/run.py $(BENCH_ARGS)

@@ -341,6 +341,8 @@ def options() -> Iterator[Bad]:
         yield Bad(f"report --style {value!a}", ("report", "run", f"--style={value}"), {}, "style")
     for command in ("report", "status", "compare"):
         for place in ("nowhere", "", "good.toml", "/dev/null", "a\0b", "\udcff", "a" * 5000, "."):
+            if (command, place) == ("compare", "good.toml"):
+                continue  # a campaign is computed for the comparison
             yield Bad(f"{command} {place[:20]!a}", (command, place, *(("run",) if command == "compare" else ())), good)
     for value in ("", "..", "a\0b", "\udcff", "a" * 5000, "-"):
         yield Bad(f"new {value[:20]!a}", ("new", "--", value), good, "")

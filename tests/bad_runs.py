@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 import random
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+
+import pyarrow.parquet as pq
 
 from bad_inputs import HUGE, directory, fifo, itself
 from judged_call import Bad, Content
@@ -122,11 +125,21 @@ def tables(good: Path) -> Iterator[Bad]:
         yield Bad(f"run: summary.csv: {what}", ("report", "run"), {"x": in_run("summary.csv", content)}, "summary.csv")
 
 
+def one_bit(data: bytes) -> bytes:
+    """Among the numbers of the first column."""
+    column = pq.ParquetFile(io.BytesIO(data)).metadata.row_group(0).column(0)
+    place = 4 + column.total_compressed_size // 2
+    return data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :]
+
+
 def other_files(good: Path) -> Iterator[Bad]:
     case = next((good / "series").iterdir()).name
+    yield Bad("run: series: one bit changed", ("report", "run"), {"x": in_run(f"series/{case}", one_bit)}, case)
     for what, content in {"a pipe": fifo, "a directory": directory, "a link to itself": itself, "binary": bytes(range(256)), "empty": "",
-                          "cut": lambda data: data[: len(data) // 2], "a byte changed": lambda data: data[:-200] + b"\x00" * 20 + data[-180:]}.items():  # fmt: skip
-        yield Bad(f"run: series: {what}", ("report", "run"), {"x": in_run(f"series/{case}", content)}, case)
+                          "cut": lambda data: data[: len(data) // 2], "bytes changed": lambda data: data[:-200] + b"\x00" * 20 + data[-180:]}.items():  # fmt: skip
+        # at its end a Parquet file says what is in it: of that some bytes matter and some do not
+        codes = (0, 2) if what == "bytes changed" else (2,)
+        yield Bad(f"run: series: {what}", ("report", "run"), {"x": in_run(f"series/{case}", content)}, case, codes)
         yield Bad(
             f"run: manifest.json: {what}", ("report", "run"), {"x": in_run("manifest.json", content)}, "manifest.json"
         )

@@ -16,6 +16,7 @@ import pytest
 from stored_pictures import store_pictures
 from test_report import make_run
 from workbench.campaign import verdict
+from workbench.campaign.store import write_series
 from workbench.errors import OutputError
 from workbench.parquet_columns import read_columns
 from workbench.report import tables
@@ -186,3 +187,25 @@ def test_more_values_than_memory_should_hold(tmp_path: Path, monkeypatch: pytest
         read_columns(path, None, 10_000, ("case",))
     with pytest.raises(OutputError, match="has more than 10 bytes"):
         read_columns(path, None, 10)
+
+
+@pytest.mark.parametrize("checked", [True, False])
+def test_a_changed_byte_gives_no_other_numbers(tmp_path: Path, checked: bool) -> None:
+    """Pages carry checksums; the twin without them reads wrong numbers as if they were right."""
+    random = np.random.default_rng(7)
+    columns = {f"c{i}": random.normal(size=30) for i in range(12)}
+    write_series(tmp_path, "right", columns)
+    right = (tmp_path / "series" / "right.parquet").read_bytes()
+    if not checked:
+        sink = pa.BufferOutputStream()
+        pq.write_table(pa.table(columns), sink)
+        right = sink.getvalue().to_pybytes()
+    wrong, path = 0, tmp_path / "changed.parquet"
+    for place in random.integers(4, len(right), 300):
+        path.write_bytes(right[:place] + bytes([right[place] ^ (1 << int(random.integers(8)))]) + right[place + 1 :])
+        try:
+            found = read_columns(path, tuple(columns), 10_000_000)
+        except OutputError:
+            continue
+        wrong += any((found.column(name).to_numpy() != values).any() for name, values in columns.items())
+    assert (wrong == 0) == checked

@@ -17,6 +17,7 @@ from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
+import typer
 
 from small_campaign import CANDIDATES, CASE, HEAD
 from sweep_campaign import SWEEP
@@ -80,6 +81,7 @@ def trapped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("trapped")
     (place / "small.toml").write_text(CAMPAIGN)
     (place / "varied.toml").write_text(SWEEP.replace("samples = 40", "samples = 4"))
+    (place / "pendulum.urdf").write_text(URDF)
     lay_traps(place, place / "marks")
     if shutil.which("git"):
         lay_traps_of_git(place)
@@ -111,8 +113,23 @@ COMMANDS = (
     (("model", "render", "models/asym_2rss_ppap.xml", "--out", "f.mp4", "--campaign", "small.toml", "--stop", "0.1"),
      None),
     (("model", "view", "models/asym_2rss_ppap.xml"), 2),
-    (("new", "mine"), None),
+    (("new", "mine"), 0),
+    (("report", "first", "--format", "csv", "--format", "mat"), 0),
+    (("compare", "first", "second", "--html", "page.html"), 0),
+    (("diagnose", "small.toml"), None),
+    (("docs", "evidence"), 0),
+    (("robots",), 0),
+    (("robots", "fourbar", "--copy", "fourbar"), 0),
+    (("run", "--robots", "fourbar", "--quick", "--out", "library"), 0),
+    (("new", "imported", "--from", "changed.xml"), 0),
+    (("new", "pendulum", "--from", "pendulum.urdf", "--actuated", "q1"), 2),
 )  # fmt: skip
+URDF = """<robot name="pendulum"><link name="base"/><link name="arm"><inertial><origin xyz="0 0 -0.3"/><mass value="2"/>
+<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.01"/></inertial></link>
+<joint name="q1" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" effort="9" velocity="9"/></joint></robot>"""
+SERVERS = {"watch": ("small.toml",), "studio": ("small.toml", "--port", "8801")}
+"""Commands that go on until they are interrupted."""
 
 
 QUICKLY = (
@@ -141,21 +158,49 @@ def test_no_command_runs_what_lies_in_its_directory(trapped: Path, monkeypatch: 
     obey(trapped, COMMANDS)
 
 
-def test_watching_runs_nothing_either(trapped: Path) -> None:
-    command = [sys.executable, "-P", "-m", "workbench", "watch", "small.toml"]
-    with subprocess.Popen(command, cwd=trapped, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+def test_every_command_is_tried_among_traps() -> None:
+    from workbench.cli import app
+    from workbench.commands.model import model
+
+    def names(group: typer.Typer) -> set[str]:
+        called = [one.callback.__name__ for one in group.registered_commands if one.callback]
+        return {name.rstrip("_") for name in called}
+
+    tried = {arguments[0] for arguments, _ in COMMANDS} | set(SERVERS)
+    assert tried == names(app) | {"model"}
+    of_models = {arguments[1] for arguments, _ in COMMANDS if arguments[0] == "model"}
+    assert of_models == names(model)
+
+
+def interrupted(trapped: Path, command: str, waits: str) -> list[str]:
+    """What such a command says until it waits; it is interrupted then."""
+    call = [sys.executable, "-P", "-m", "workbench", command, *SERVERS[command]]
+    with subprocess.Popen(call, cwd=trapped, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         assert process.stdout is not None
-        said = []
+        said, waits_no_more = [], False
         patience = threading.Timer(300.0, process.kill)
         patience.start()
         for line in process.stdout:
             said.append(line)
-            if line.startswith("watching"):
+            if waits in line and not waits_no_more:
+                waits_no_more = True  # a second one would meet the interpreter at its end
                 process.send_signal(signal.SIGINT)
         patience.cancel()
         assert process.wait(60) in (0, 130), said  # 130: interrupted before it had begun to wait
-    assert any("within their bounds" in line for line in said), said
     assert list((trapped / "marks").iterdir()) == []
+    return said
+
+
+def test_watching_runs_nothing_either(trapped: Path) -> None:
+    said = interrupted(trapped, "watch", "watching")
+    assert any("within their bounds" in line for line in said), said
+
+
+@pytest.mark.long
+def test_the_studio_runs_nothing_either(trapped: Path) -> None:
+    pytest.importorskip("viser")
+    said = interrupted(trapped, "studio", "Ctrl-C")
+    assert any("http://127.0.0.1:" in line for line in said), said
 
 
 def test_python_m_leaves_the_directory_out_as_well(tmp_path: Path) -> None:

@@ -158,6 +158,16 @@ def test_other_commands_that_call_formulas(tmp_path: Path, command: str) -> None
     assert "it has to return" in out + err + kept
 
 
+@pytest.mark.slow
+@POSIX
+def test_a_sweep_notices_machine_code_that_ends_its_workers(tmp_path: Path) -> None:
+    """As docs/safety.md says; a plain run has nobody beside it who could."""
+    (tmp_path / "more.toml").write_text(SWEEP.replace("samples = 40", "samples = 2"))
+    arguments = ["run", "more.toml", "--candidates", "f.py", "--out", "out", "--jobs", "1"]
+    code, out, err = called(tmp_path, arguments, "ctypes.CDLL(None)._exit(0)")
+    assert code not in (0, 4), out + err
+
+
 def test_the_guard_knows_its_own_package() -> None:
     assert no_exit.OWN.endswith(os.sep)
     assert no_exit.__file__.startswith(no_exit.OWN)

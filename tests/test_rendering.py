@@ -314,7 +314,9 @@ def test_a_run_keeps_a_still_and_a_film_of_its_first_case(drawing: Workbench, mo
     assert np.abs(frames[0] - frames[0]).max() == 0
     again = drawing.run(SMALL, "--quick", "--out", "run")  # pictures are part of a run directory
     assert again.code == 0
-    assert drawing.run(SMALL, "--quick", "--no-pictures", "--out", "run").code == 0
+    assert drawing.run(SMALL, "--quick", "--no-pictures", "--out", "run").code == 2  # which would be lost
+    assert place.exists()
+    assert drawing.run(SMALL, "--quick", "--no-pictures", "--out", "run", "--replace").code == 0
     assert not place.exists()
 
 

@@ -10,6 +10,7 @@ import pytest
 from pydantic import BaseModel
 
 import workbench as wb
+from workbench.library.card import Card, MobilitySpec
 from workbench.robots.actuators import ActuatorSpec
 from workbench.robots.places import KINDS
 from workbench.robots.robot_file import BarSpec, ParameterSpec, PlatformSpec, RobotSpec
@@ -20,6 +21,8 @@ SECTIONS: dict[str, type[BaseModel]] = {
     "### `[parameters.NAME]`": ParameterSpec,
     "### `[[bars]]`": BarSpec,
     "### `[actuators.JOINT]`": ActuatorSpec,
+    "## The card of a robot of the library": Card,
+    "### `[mobility]`": MobilitySpec,
 }
 
 

@@ -13,6 +13,7 @@ import pytest
 
 import workbench as wb
 from small_campaign import CASE, HEAD, MOTION, Workbench
+from stored_pictures import store_pictures
 from workbench.campaign.changed import CASE as BY_CASE
 from workbench.campaign.changed import Change, sentences
 from workbench.campaign.conclusion import EXIT_CODES, CaseOutcome, case_status, conclude, conclude_sweep
@@ -306,6 +307,31 @@ def test_a_run_of_less_evidence_takes_the_place_of_more_only_when_asked(workbenc
     assert json.loads((tmp_path / "run/manifest.json").read_text())["budget"] is False
     assert workbench.run(campaign, "--quick", *options).code == 0
     assert workbench.run(campaign, *options).code == 0  # more evidence loses nothing
+
+
+def test_pictures_are_lost_only_when_asked(tmp_path: Path) -> None:
+    (tmp_path / "manifest.json").write_text(json.dumps({"campaign": "c", "cases": {"a": {}}, "request": asked()}))
+    (tmp_path / "pictures").mkdir()
+    (tmp_path / "pictures" / "pictures.json").write_text("{}")  # says why there are none
+    refuse_loss(tmp_path, "c", asked(), ["a"], [], drawn=False)
+    (tmp_path / "pictures" / "film.webp").write_bytes(b"RIFF")
+    with pytest.raises(OutputError, match="with pictures of the robot, which this one does not draw; --replace"):
+        refuse_loss(tmp_path, "c", asked(), ["a"], [], drawn=False)
+    refuse_loss(tmp_path, "c", asked(), ["a"], [], drawn=True)
+
+
+def test_a_run_without_pictures_keeps_the_earlier_ones_pictures(workbench: Workbench, tmp_path: Path) -> None:
+    campaign = HEAD + CASE + '[[candidate]]\nname = "lumped"\nreference = "lumped"\nbound = 1e-10\n'
+    options = ("--quick", "--no-pictures", "--out", "run")
+    assert workbench.run(campaign, *options).code == 0
+    assert workbench.run(campaign, *options).code == 0  # nothing is lost
+    store_pictures(tmp_path / "run", case="first")
+    done = workbench.run(campaign, *options)
+    assert done.code == 2
+    assert "with pictures of the robot" in done.complaint[0]
+    assert (tmp_path / "run/pictures/film.webp").is_file()
+    assert workbench.run(campaign, "--replace", *options).code == 0
+    assert not (tmp_path / "run/pictures").exists()
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,9 @@ import pytest
 import workbench as wb
 from workbench.capabilities.robot import Robot
 from workbench.cli import _run
-from workbench.errors import MotionError, ParameterError
+from workbench.errors import MotionError, OutputError, ParameterError
 from workbench.workspace.grid import Workspace, compute_workspace
+from workbench.workspace.store import FACTS, refuse_other
 
 MODELS = ("models/asym_2rss_ppap.xml", "models/planar_4rprp.xml")
 
@@ -148,3 +149,22 @@ def test_another_workspace_takes_its_place_only_when_asked(tmp_path: Path, capsy
         assert (out / "workspace.json").read_bytes() == before
     assert _run([*others["a grid"], "--replace"]) == 0
     assert json.loads((out / "workspace.json").read_text())["spacing_m"] == 0.09
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "lost"),
+    [(["a", "b"], ["b", "a"], False), (["a"], ["a", "b"], False), ([], ["a"], False), (["a", "b"], ["a"], True),
+     (["a"], [], True), ("nonsense", [], False)],
+)  # fmt: skip
+def test_marked_cases_are_lost_only_when_asked(tmp_path: Path, before: object, now: list[str], lost: bool) -> None:
+    known = {"mechanism": "delta", "parameters": {"a": 1.0}}
+    (tmp_path / FACTS).write_text(json.dumps(known | {"marked": before}))
+    if lost:
+        with pytest.raises(OutputError, match="an earlier workspace with marked cases unlike this one's; --replace"):
+            refuse_other(tmp_path, known | {"marked": now})
+    else:
+        refuse_other(tmp_path, known | {"marked": now})
+    with pytest.raises(OutputError, match="with a robot, parameters unlike"):
+        refuse_other(tmp_path, {"mechanism": "other", "parameters": {"a": 2.0}})
+    (tmp_path / FACTS).write_text(json.dumps(known))  # as earlier versions wrote it
+    refuse_other(tmp_path, known | {"marked": now})

@@ -16,7 +16,7 @@ def dot(one, two):
 
 def platform(p, q):
     """The platform's centre: on three spheres of radius L about points on three axes."""
-    centre = q - p.L
+    centre = q - p.s + p.w
     inverse = (1 / centre**2).sum(axis=1, keepdims=True)
     rest = (centre**2).sum(axis=1, keepdims=True) / 4 - p.L**2
     half = -(1 + np.sqrt(1 - 4 * inverse * rest)) / (2 * inverse)
@@ -40,7 +40,7 @@ def turning(p, leg, leg_rate, leg_acceleration, bars, ends):
 def forces(p, q, qd, qdd, force, masses, bars, ends):
     """Slider forces; masses at the legs' ends and their coupling, inertias that turn with a leg."""
     near, far, cross = masses
-    leg = platform(p, q)[:, None] - (q - p.L)[:, :, None] * SLIDE
+    leg = platform(p, q)[:, None] - (q - p.s + p.w)[:, :, None] * SLIDE
     jacobian = np.linalg.solve(leg, dot(leg, SLIDE) * np.eye(3))
     xd = (jacobian @ qd[:, :, None])[:, None, :, 0]
     leg_rate = xd - qd[:, :, None] * SLIDE
@@ -67,3 +67,22 @@ def exact(p, q, qd, qdd, force):
 def two_points(p, q, qd, qdd, force):
     """Half of a leg's mass at the slider, half at the platform, nothing that turns."""
     return forces(p, q, qd, qdd, force, (p.mb, p.mb, 0.0), 0.0, 0.0)
+
+
+@workbench.forward_kinematics
+def forward(p, q):
+    """Three spheres, in closed form."""
+    return platform(p, q)
+
+
+@workbench.inverse_kinematics
+def inverse(p, x):
+    """A sphere and a slide for each leg, the slider behind the platform."""
+    return x + p.s - p.w - np.sqrt(p.L**2 - ((x**2).sum(axis=1, keepdims=True) - x**2))
+
+
+@workbench.jacobian
+def jacobian(p, q):
+    """Rates of (x, y, z): xd = J qd."""
+    leg = platform(p, q)[:, None] - (q - p.s + p.w)[:, :, None] * SLIDE
+    return np.linalg.solve(leg, dot(leg, SLIDE) * np.eye(3))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from workbench.capabilities.load import load_robot
     from workbench.capabilities.load import load_robot as load_mechanism
     from workbench.capabilities.robot import Robot
+    from workbench.control.user_controller import controller
     from workbench.diagnosis.surface import diagnose
     from workbench.diagnosis.terms_frame import terms
     from workbench.errors import WorkbenchError
@@ -37,6 +38,7 @@ __all__ = [
     "WorkbenchError",
     "__version__",
     "candidate",
+    "controller",
     "diagnose",
     "forward_kinematics",
     "inverse_kinematics",
@@ -52,6 +54,7 @@ _HOMES = {
     "MujocoReference": "workbench.reference",
     "WorkbenchError": "workbench.errors",
     "candidate": "workbench.robots.registration",
+    "controller": "workbench.control.user_controller",
     "forward_kinematics": "workbench.robots.registration",
     "inverse_kinematics": "workbench.robots.registration",
     "jacobian": "workbench.robots.registration",

@@ -25,6 +25,7 @@ from workbench.commands.docs import docs
 from workbench.commands.model import model
 from workbench.commands.new import new
 from workbench.commands.report import report
+from workbench.commands.robots import robots
 from workbench.commands.run import run
 from workbench.commands.status import status
 from workbench.commands.studio import studio
@@ -81,6 +82,7 @@ app.command()(run)
 app.command()(new)
 app.command()(status)
 app.command()(docs)
+app.command()(robots)
 app.command()(workspace)
 app.add_typer(model)
 app.command()(compare)

@@ -7,10 +7,13 @@ from typing import Literal, get_args
 
 from workbench.errors import WorkbenchError, did_you_mean
 
-Kind = Literal["models", "campaigns", "docs"]
+Kind = Literal["models", "campaigns", "docs", "examples"]
 
-SUFFIXES: dict[str, str] = {"models": ".xml", "campaigns": ".toml", "docs": ".md"}
-"""What the files of each kind end in; a name may be given without it."""
+SUFFIXES: dict[str, str] = {"models": ".xml", "campaigns": ".toml", "docs": ".md", "examples": "robot.toml"}
+"""What the files of each kind end in; a name may be given without it. Of examples: folders of robots."""
+
+FOLDERS = {"docs": "**/", "examples": "*/"}
+"""Kinds whose files lie in folders."""
 
 _PACKAGE = Path(__file__).resolve().parent
 
@@ -21,7 +24,7 @@ def bundled_directory(kind: Kind, package: Path = _PACKAGE) -> Path:
     Parameters
     ----------
     kind
-        ``models``, ``campaigns`` or ``docs``.
+        ``models``, ``campaigns``, ``docs`` or ``examples``.
     package
         Directory of the package ``workbench``; another one only in tests.
 
@@ -43,7 +46,7 @@ def bundled_directory(kind: Kind, package: Path = _PACKAGE) -> Path:
 
 
 def bundled_names(kind: Kind, package: Path = _PACKAGE) -> tuple[str, ...]:
-    """Return the file names of one kind, sorted; those of documents with their folder, ``derivations/x.md``.
+    """Return the file names of one kind, sorted; of documents and examples with their folder, ``derivations/x.md``.
 
     Raises
     ------
@@ -51,7 +54,7 @@ def bundled_names(kind: Kind, package: Path = _PACKAGE) -> tuple[str, ...]:
         As `bundled_directory`.
     """
     directory = bundled_directory(kind, package)
-    pattern = f"{'**/' if kind == 'docs' else ''}*{SUFFIXES[kind]}"
+    pattern = f"{FOLDERS.get(kind, '')}*{SUFFIXES[kind]}"
     return tuple(sorted(path.relative_to(directory).as_posix() for path in directory.glob(pattern)))
 
 

@@ -48,7 +48,7 @@ def read_columns(
     """
     try:
         # read_table of a Python file leaves threads behind that abort an interpreter which ends soon after
-        with pq.ParquetFile(pa.BufferReader(read_bytes(path, largest))) as file:
+        with pq.ParquetFile(pa.BufferReader(read_bytes(path, largest)), page_checksum_verification=True) as file:
             chosen = _judged(path, file, names, texts, indices, rows)
             table = file.read(columns=chosen, use_threads=False)
     except FileNotFoundError:

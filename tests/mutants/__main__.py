@@ -26,6 +26,8 @@ INTERPRETED = PLACE / "reached-interpreted.json"
 RESULTS = PLACE / "results.jsonl"
 BASELINE_LIMIT = 3600
 """seconds of the processor for the core tests without a fault"""
+GIVEN_LIMIT = 600
+"""seconds of the processor for test files that are tried whole"""
 COMPILING = 120
 """seconds of the processor that compiling kernels may add"""
 A_MOMENT = 0.05
@@ -184,9 +186,9 @@ def _try(planted: Planted, budget: float, files: list[str]) -> tuple[trial.Outco
     with tree.planted(planted.module, planted.mutant.planted(text)):
         if files and kernel and not planted.module.startswith("reference/"):
             with tree.own_cache() as cache:
-                outcome, tried = trial.trial(files, cache, BASELINE_LIMIT), len(files)
+                outcome, tried = trial.trial(files, cache, GIVEN_LIMIT), len(files)
         elif files:
-            outcome, tried = trial.trial(files, tree.CACHE, BASELINE_LIMIT, interpreted=kernel), len(files)
+            outcome, tried = trial.trial(files, tree.CACHE, GIVEN_LIMIT, interpreted=kernel), len(files)
         else:
             outcome, tried = _try_reaching(planted, INTERPRETED if kernel else REACHED, budget)
         if not kernel or files or outcome.status != trial.SURVIVED:

@@ -123,17 +123,18 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         _refuse_other_branch(case, platform.task[0])
     sound = [name for name in torques if name not in computed.faults]
     evidence = gather_evidence(case, reference, results, sound, effort)
+    felt = {name: largest_reaction(result.reactions.values()) for name, result in results.items()}
     rows = [
         row
         for candidate in campaign.candidate
-        for row in _rows(case, candidate, computed.judged(candidate.name), results[candidate.reference], evidence)
+        for row in _rows(case, candidate, computed.judged(candidate.name), results[candidate.reference], evidence, felt)
     ]
     rows = [dataclasses.replace(row, verdict=FAIL) if row.candidate in computed.faults else row for row in rows]
     hints = _hints(case, rows, torques, results)
     recorded = [_recorded(case, spec, record, reference, results, evidence) for spec, record in case.records]
     rows += [row for found in recorded for row in _recorded_rows(case, found, evidence)]
     if effort.budget:
-        rows += _raw_rows(case, reference, results, evidence)
+        rows += _raw_rows(case, reference, results, evidence, felt)
     for mass_model, result in results.items():
         series |= _columns(f"ref_{mass_model}", result.tau, robot.joints)
     for name in sound:
@@ -210,22 +211,32 @@ def _refuse_other_branch(case: Case, x: FloatArray) -> None:
 
 
 def _raw_rows(
-    case: Case, reference: MujocoReference, results: Mapping[str, ReferenceResult], evidence: Evidence
+    case: Case,
+    reference: MujocoReference,
+    results: Mapping[str, ReferenceResult],
+    evidence: Evidence,
+    felt: Mapping[str, float],
 ) -> list[Row]:
     """What `mj_inverse` gives without projection, beside the candidates: why the reference projects."""
     motion = case.motion
     name = "distributed" if "distributed" in results else next(iter(results))
     spec = CandidateSpec(name=RAW_NAME, reference=name)
     tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force, motion.t)
-    rows = _rows(case, spec, tau, results[name], evidence)
+    rows = _rows(case, spec, tau, results[name], evidence, felt)
     return [dataclasses.replace(row, candidate=RAW_INVERSE, kind=CONTRAST) for row in rows]
 
 
 def _rows(
-    case: Case, candidate: CandidateSpec, tau: FloatArray, reference: ReferenceResult, evidence: Evidence
+    case: Case,
+    candidate: CandidateSpec,
+    tau: FloatArray,
+    reference: ReferenceResult,
+    evidence: Evidence,
+    felt: Mapping[str, float],
 ) -> list[Row]:
+    """Rows of one candidate; *felt* is the largest reaction by reference."""
     rows = []
-    reaction = largest_reaction(reference.reactions.values())
+    reaction = felt[candidate.reference]
     known = case.robot.candidates.get(candidate.name)
     mass_model = known.mass_model if known else candidate.reference
     for i, joint in enumerate(case.robot.joints):

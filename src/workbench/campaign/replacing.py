@@ -8,7 +8,7 @@ from typing import Any
 
 from workbench.campaign.changed import few
 from workbench.campaign.evidence import FULL, Effort
-from workbench.campaign.store import MANIFEST
+from workbench.campaign.store import MANIFEST, PICTURES
 from workbench.errors import OutputError
 from workbench.reading import read_json
 
@@ -42,6 +42,7 @@ def refuse_loss(
     cases: Collection[str],
     candidates: Collection[str],
     effort: Effort = FULL,
+    drawn: bool = True,
 ) -> None:
     """Refuse to put a run of another robot, selection, candidates or less evidence in the place of an earlier one.
 
@@ -56,6 +57,8 @@ def refuse_loss(
         Names that the new run will hold.
     effort
         The evidence that it will hold.
+    drawn
+        Whether it tries to draw pictures of the robot.
 
     Raises
     ------
@@ -69,6 +72,8 @@ def refuse_loss(
     lost = _lost(old, campaign, request, cases, candidates) if isinstance(old, Mapping) else []
     if isinstance(old, Mapping) and not old.get("sweep"):
         lost += lost_evidence(old, effort)
+    if not drawn and any((directory / PICTURES).glob("*.webp")):
+        lost.append("with pictures of the robot, which this one does not draw")
     if lost:
         raise OutputError(
             f"{directory}: holds an earlier run {'; '.join(lost)}; --replace (replace=True) puts this run in its place,"

@@ -134,7 +134,7 @@ def run_campaign(
     keep_going
         Record cases that cannot be driven, each with the nearest pose that can, and compute the others.
     replace
-        Put the run in the place of an earlier one that holds what this one does not: other cases, another robot.
+        Put the run in the place of an earlier one that holds what this one does not: cases, pictures, another robot.
     good
         Wanted accuracy of formulas without a bound, in place of the campaign's: a fraction, 0.02 is 2 %.
 
@@ -151,6 +151,8 @@ def run_campaign(
         if out is not None
         else Path("reports") / (f"{campaign.name}-cases" if campaign.sweep else campaign.name)
     )
+    if campaign.control:
+        raise SpecError(f"{file}: has [control]; workbench run, or workbench.control.run.run_study, runs it")
     users = load_candidates(candidates)
     own = {candidate.name for candidate in campaign.candidate}
     campaign = with_good(with_rows(campaign, users), good)
@@ -163,7 +165,7 @@ def run_campaign(
     if not replace:
         names = [case.name for case in campaign.case if not only or case.name in only]
         formulas = {candidate.name for candidate in campaign.candidate}
-        refuse_loss(directory, campaign.name, request, names, formulas, effort)
+        refuse_loss(directory, campaign.name, request, names, formulas, effort, drawn=pictures is not None)
     check_engines(effort.engines)
     check_asked(campaign, str(file))
     missing: list[NotDriven] = []

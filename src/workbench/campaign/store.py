@@ -38,7 +38,7 @@ def write_series(stage: Path, case: str, columns: Mapping[str, FloatArray]) -> N
     folder = stage / SERIES
     folder.mkdir(exist_ok=True)
     # by way of memory: Arrow opens no file whose name is not UTF-8
-    content = pd.DataFrame(dict(columns)).to_parquet(index=False)
+    content = pd.DataFrame(dict(columns)).to_parquet(index=False, write_page_checksum=True)
     (folder / f"{case}.parquet").write_bytes(content)
 
 

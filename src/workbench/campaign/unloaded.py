@@ -22,7 +22,8 @@ the whole case is unloaded. Rounding is 1e-11 of this limit; the least loaded jo
 
 def largest_reaction(reactions: Iterable[FloatArray]) -> float:
     """Return the largest magnitude among reaction forces, each ``(n, 3)`` in newtons; 0 where there are none."""
-    return max((float(np.linalg.norm(force, axis=1).max()) for force in reactions), default=0.0)
+    every = [force for force in reactions if len(force)]
+    return float(np.linalg.norm(np.concatenate(every), axis=1).max()) if every else 0.0
 
 
 def normaliser_of(error: JointError, reaction: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,9 +12,18 @@ from workbench.commands.assignments import settings
 from workbench.commands.options import CampaignOrNone, OtherModel, SetInCases
 from workbench.errors import SpecError
 
+if TYPE_CHECKING:
+    from workbench.campaign.evidence import Effort
+
 
 def run(
     campaign: CampaignOrNone = None,
+    robots: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="In place of a campaign: check this robot of the library, or all; may be repeated."
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -32,6 +41,12 @@ def run(
         typer.Option(
             metavar="FILE",
             help="File with formulas of your own, which is run: .py .m .c .so .jl .R or a program; may be repeated.",
+        ),
+    ] = None,
+    controllers: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE", help="Python file with controllers of your own for [control], run; may be repeated."
         ),
     ] = None,
     engines: Annotated[
@@ -57,7 +72,7 @@ def run(
         bool,
         typer.Option(
             "--replace",
-            help="Replace an earlier run of another robot, other cases or candidates, or of more evidence.",
+            help="Replace an earlier run of another robot, other cases or candidates, of more evidence, with pictures.",
         ),
     ] = False,
     good: Annotated[
@@ -87,7 +102,6 @@ def run(
     input; 4: nothing was held against a bound, so nothing is judged.
     """
     from workbench.campaign.asked import with_good
-    from workbench.campaign.evidence import Effort
     from workbench.campaign.run import run_campaign
     from workbench.campaign.spec import campaign_names, load_campaign
     from workbench.commands.sweeps import dry_run as print_dry_run
@@ -96,12 +110,53 @@ def run(
     from workbench.sweep.pick import pick_cases
     from workbench.sweep.run import SweepInterrupted, SweepOptions
 
+    if robots:
+        others: dict[str, object] = {
+            "CAMPAIGN": campaign, "--only": only, "--set": set_, "--model": model, "--candidates": candidates,
+            "--dry-run": dry_run, "--keep-going": keep_going, "--good": good, "--jobs": jobs, "--fresh": fresh,
+            "--retry-failed": retry_failed, "--scheduler": scheduler,
+        }  # fmt: skip
+        if beside := [name for name, value in others.items() if value]:
+            raise SpecError(f"--robots {robots[0]}: runs a robot's own campaign as it is, without {beside[0]}")
+        from workbench.commands.run_library import run_library
+
+        code = run_library(robots, out, _effort(engines, quick), ["workbench", *sys.argv[1:]], replace=replace)
+        if code:
+            raise typer.Exit(code)
+        return
     if campaign is None:
         raise SpecError(f"which CAMPAIGN? A TOML file, or one that comes along: {', '.join(campaign_names())}")
     values, relative = settings(set_ or [])
-    effort = Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick)
+    effort = _effort(engines, quick)
     command = ["workbench", *sys.argv[1:]]
     spec, file = load_campaign(campaign)
+    if spec.control is not None:
+        from workbench.commands.studies import refuse_options, run_study_and_print
+
+        given = {"only": only, "dry_run": dry_run, "good": good, "relative": relative, "scheduler": scheduler}
+        given |= {"quick": quick, "keep_going": keep_going, "engines": engines != "mujoco"}
+        refuse_options(str(campaign), **given)
+        try:
+            code = run_study_and_print(
+                spec,
+                file,
+                out,
+                model=model,
+                settings=values,
+                command=command,
+                options=SweepOptions(jobs, None, fresh, retry_failed, replace),
+                candidates=candidates or (),
+                controllers=controllers or (),
+                report=report_apart,
+            )
+        except SweepInterrupted as stop:
+            typer.echo(f"workbench: {stop}", err=True)
+            raise
+        if code:
+            raise typer.Exit(code)
+        return
+    if controllers:
+        raise SpecError(f"{campaign}: --controllers {controllers[0]}: the campaign has no [control]")
     sweep = spec.sweep is not None and not only
     if relative and (sweep or dry_run):
         raise SpecError(f"{campaign}: --set NAME*=FACTOR does not go with {'--dry-run' if dry_run else 'a sweep'}")
@@ -157,3 +212,9 @@ def run(
         code = outcome.conclusion.exit_code
     if code:
         raise typer.Exit(code)
+
+
+def _effort(engines: str, quick: bool) -> Effort:
+    from workbench.campaign.evidence import Effort
+
+    return Effort(tuple(dict.fromkeys(part.strip() for part in engines.split(","))), budget=not quick)

@@ -35,7 +35,7 @@ def workspace(
         Path | None, typer.Option(metavar="DIR", help="Where it is written. Default: reports/workspace_MECHANISM.")
     ] = None,
     replace: Annotated[
-        bool, typer.Option("--replace", help="Replace an earlier workspace of another robot, grid or range.")
+        bool, typer.Option("--replace", help="Replace an earlier workspace of another robot, grid, range or campaign.")
     ] = False,
 ) -> None:
     """Compute the reachable workspace by discretisation: volume with its error, cells as Parquet, figures."""
@@ -58,19 +58,20 @@ def workspace(
         robot = robot_with(model, table.layered(values, resolve_changes(table, robot.values, relative)))
     directory = out or Path("reports") / f"workspace_{robot.name}"
     check_output(directory, WORKSPACE)
-    if not replace:
-        refuse_other(directory, {"mechanism": robot.name, "parameters": dict(robot.values)})
     paths = {}
     if campaign:
         spec, file = load_campaign(campaign)
         paths = {case.name: case.x for case in resolve_cases(spec, file, find_source(model).model)}
+    if not replace:
+        refuse_other(directory, {"mechanism": robot.name, "parameters": dict(robot.values), "marked": list(paths)})
     with Steps("computing and drawing the workspace") as show:
         show(0, 2)
         computed = compute_workspace(robot, grid, ranges(limit or []), settings(at or [], "--at")[0])
         show(1, 2)
+        facts = workspace_facts(computed, robot, paths)
         if not replace:
-            refuse_other(directory, workspace_facts(computed, robot))
+            refuse_other(directory, facts)
         with locked(directory), staged(directory, alone=True) as stage:
-            write_workspace(stage, computed, robot)
+            write_workspace(stage, computed, facts, robot)
             draw_workspace(stage, paths)
-    print_workspace(workspace_facts(computed, robot), directory)
+    print_workspace(facts, directory)

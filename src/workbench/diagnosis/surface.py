@@ -110,6 +110,8 @@ def subjects(
     spec, file = load_campaign(campaign)
     users = load_candidates(candidates)
     spec = with_rows(spec, users)
+    if spec.control:
+        raise SpecError(f"{file}: has [control] and compares no formula; diagnose a campaign of cases")
     if spec.sweep:
         raise SpecError(f"{file}: has a sweep; diagnose a campaign of cases")
     cases = resolve_cases(spec, file, model, users=users)

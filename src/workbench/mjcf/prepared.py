@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import mujoco
@@ -24,7 +26,8 @@ MOST_NAMED = 4
 class Prepared:
     """A model as it was prepared, and how to make its specification again."""
 
-    source: Source
+    reading: Callable[[], Source] = field(repr=False)
+    """how `source` is made"""
     preparation: Preparation | None
     """None: the file says all that is needed"""
     model: mujoco.MjModel
@@ -32,6 +35,11 @@ class Prepared:
     """the file as it lies; `model` itself where nothing had to be prepared"""
     notes: tuple[str, ...] = ()
     """what a reader of results has to know of the file"""
+
+    @cached_property
+    def source(self) -> Source:
+        """The file as MuJoCo is handed it."""
+        return self.reading()
 
     def spec(self) -> mujoco.MjSpec:
         """A fresh specification of `model`, to be changed and compiled."""
@@ -49,7 +57,7 @@ def open_source(text: str, file: str, folder: Path | None, elements: list[Elemen
     """
     source = read_source(text, file, folder, elements)
     model = compile_spec(parse(source), file)
-    return Prepared(source, None, model, model, file_notes(source))
+    return Prepared(lambda: source, None, model, model, file_notes(source))
 
 
 def prepare(text: str, file: str, folder: Path | None, setup: Setup) -> Prepared:
@@ -88,7 +96,7 @@ def prepared_for(whole: Prepared, file: str, setup: Setup) -> Prepared:
     except ValueError as error:
         raise ModelError(f"{file}: {error}", file=file) from error
     check_same_robot(whole.user, model, preparation, file)
-    return dataclasses.replace(made, model=model, notes=(*whole.notes, *_moved(whole.user, preparation)))
+    return dataclasses.replace(made, model=model, notes=(*whole.notes, *what_moved(whole.user, preparation)))
 
 
 def file_notes(source: Source) -> tuple[str, ...]:
@@ -102,7 +110,7 @@ def file_notes(source: Source) -> tuple[str, ...]:
     return (*notes, *compiler_changes(source))
 
 
-def _moved(user: mujoco.MjModel, preparation: Preparation) -> list[str]:
+def what_moved(user: mujoco.MjModel, preparation: Preparation) -> list[str]:
     """Rotors counted at their joints, bodies that stand still, platforms in other coordinates."""
     notes = []
     names = [mujoco.mj_id2name(user, mujoco.mjtObj.mjOBJ_JOINT, j) or f"#{j}" for j in range(user.njnt)]

@@ -36,7 +36,7 @@ def parquet_table(data: bytes, file: str, most_rows: int) -> Table:
     from pyarrow import parquet
 
     try:
-        stored = parquet.ParquetFile(io.BytesIO(data))
+        stored = parquet.ParquetFile(io.BytesIO(data), page_checksum_verification=True)
         names = [name for name in stored.schema_arrow.names if _MOTION.fullmatch(name)]
         rows = stored.metadata.num_rows
         if rows > most_rows:

@@ -180,7 +180,7 @@ def _parquet(data: bytes, file: str) -> dict[str, Any]:
     from pyarrow import parquet
 
     try:
-        table = parquet.read_table(io.BytesIO(data))
+        table = parquet.read_table(io.BytesIO(data), page_checksum_verification=True)
         return {name: table.column(name).to_numpy() for name in table.column_names}
     except (pa.ArrowException, OSError, ValueError) as error:
         raise MotionError(f"{file}: no Parquet file that can be read: {error}", file=file) from error

@@ -205,9 +205,7 @@ class _Closed:
         self.structure: Structure = structure_of(loaded)
         self.engine = Engine(loaded.model, frames=self.structure.frames)
         self.closer = LoopCloser(self.engine, self.structure)
-        self.jacobian, residuals = constraint_jacobian(
-            self.engine, self.structure, self.closer.joints, self.closer.home[None, :]
-        )
+        self.jacobian, residuals = constraint_jacobian(self.engine, self.closer.tables, self.closer.home[None, :])
         self.residual = float(np.max(np.abs(residuals[: self.structure.loop_rows]), initial=0.0))
 
     def mobility(self) -> Mobility:

@@ -21,7 +21,7 @@ from workbench.reference.kinematics import is_covered, kinematics_of
 from workbench.reference.rows import constraint_rows
 from workbench.reference.sides import pattern_of
 from workbench.reference.structure import Structure
-from workbench.reference.tables import Tables, tables_of
+from workbench.reference.tables import Tables
 from workbench.reference.tolerance import KEY, RANK
 
 CONFIRMED = 2.0
@@ -35,6 +35,8 @@ LONGEST_FREE_STEP = 0.2
 
 class LoopCloser(OrderedClosure):
     """Closes the loops of one model."""
+
+    _seen: tuple[FloatArray, tuple[FloatArray, FloatArray]] | None = None
 
     def __init__(self, engine: Engine, structure: Structure, *, compiled: bool = True) -> None:
         super().__init__(engine, structure)
@@ -62,7 +64,7 @@ class LoopCloser(OrderedClosure):
             # axes that are parallel to six digits only leave no freedom, where the robot that is meant has some
             self._close_by_digits()
             found = self._newton_alone(found.qpos.copy(), found.qpos[:, self.structure.actuated_qpos])
-        self.confirm(np.abs(constraint_jacobian(self.engine, self.structure, self.joints, found.qpos)[1]), "home pose")
+        self.confirm(np.abs(self._rows(found.qpos)[1]), "home pose")
         return found
 
     def _mechanism(self) -> Mechanism:
@@ -71,7 +73,7 @@ class LoopCloser(OrderedClosure):
         joined = joined[joined[:, 0] != TENDON][:, 3:5]
         points = np.unique(joined[joined >= 0]).astype(np.int64)
         return Mechanism(
-            kinematics_of(model, structure.frames, points, structure.home_qpos), self.tables.closures, self.joints,
+            kinematics_of(model, structure.frames, points, self.centres), self.tables.closures, self.joints,
             structure.passive, structure.actuated, structure.actuated_qpos, *self._weights,
         )  # fmt: skip
 
@@ -111,7 +113,7 @@ class LoopCloser(OrderedClosure):
     def _refuse_home(self, home: FloatArray, closed: FloatArray, residual: float) -> None:
         """Describe the file as it is drawn, then how near the loops come to closing."""
         structure, allowed = self.structure, self.tolerance
-        drawn = np.abs(constraint_jacobian(self.engine, structure, self.joints, home)[1])
+        drawn = np.abs(self._rows(home)[1])
         worst = int(np.searchsorted(structure.block_rows, int(np.argmax(drawn)), side="right")) - 1
         raise ModelError(
             f"{structure.file}: the loops cannot be closed from the home pose; equality"
@@ -134,8 +136,15 @@ class LoopCloser(OrderedClosure):
         return self._home
 
     def jacobian(self, qpos: FloatArray) -> FloatArray:
-        """Constraint Jacobian ``(m, nv)`` of one configuration ``(nq,)``."""
-        return constraint_jacobian(self.engine, self.structure, self.joints, qpos[None, :])[0]
+        """Constraint Jacobian ``(m, nv)`` of one configuration ``(nq,)``, not to be written into."""
+        return self._rows(qpos[None, :])[0]
+
+    def _rows(self, qpos: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """`constraint_jacobian` of one configuration ``(1, nq)``; the last one's is kept, which is the home pose's."""
+        last = self._seen
+        if last is None or not np.array_equal(last[0], qpos):
+            last = self._seen = qpos.copy(), constraint_jacobian(self.engine, self.tables, qpos)
+        return last[1]
 
     def jacobian_near_home(self, way: FloatArray) -> FloatArray:
         """Constraint Jacobian of the closed pose that is nearest to home moved by a velocity ``(nv,)``."""
@@ -150,7 +159,7 @@ class LoopCloser(OrderedClosure):
         """
         best, least = qpos.copy(), np.inf
         for _ in range(FREE_STEPS):
-            jacobian, open_by = constraint_jacobian(self.engine, self.structure, self.joints, qpos)
+            jacobian, open_by = constraint_jacobian(self.engine, self.tables, qpos)
             residual = float(np.abs(open_by).max(initial=0.0))
             if not np.isfinite(residual):
                 break
@@ -225,12 +234,10 @@ class LoopCloser(OrderedClosure):
         )
 
 
-def constraint_jacobian(
-    engine: Engine, structure: Structure, joints: tuple[np.ndarray, ...], qpos: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def constraint_jacobian(engine: Engine, tables: Tables, qpos: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Constraint Jacobian ``(m, nv)``, spin rows last, and residual ``(m,)`` of one configuration ``(1, nq)``."""
-    poses, tables = engine.poses(qpos), tables_of(engine.model, structure)
-    jacobian, residual = np.zeros((structure.rows, poses.cdof.shape[1])), np.zeros(structure.rows)
+    poses, rows = engine.poses(qpos), int(tables.closures.block_rows[-1])
+    jacobian, residual = np.zeros((rows, poses.cdof.shape[1])), np.zeros(rows)
     constraint_rows(tables.closures, tables.joints, qpos[0], *(array[0] for array in poses.tables), jacobian, residual)
     return jacobian, residual
 

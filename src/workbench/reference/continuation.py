@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
@@ -117,9 +118,17 @@ class Continuation(ABC):
     def __init__(self, engine: Engine, structure: Structure) -> None:
         self.engine = engine
         self.structure = structure
-        self.tables = tables_of(engine.model, structure)
+        self.tables = engine.shelf.tables = tables_of(engine.model, structure, engine.shelf.tables)
         self.joints = self.tables.joints
-        self.tolerance = tolerance_of(engine.model, structure.home_qpos, structure.file)
+        with engine.shelf.data_of(engine.model) as drawn:
+            drawn.qpos[:] = structure.home_qpos
+            mujoco.mj_kinematics(engine.model, drawn)
+            mujoco.mj_comPos(engine.model, drawn)
+            self.tolerance = tolerance_of(engine.model, drawn, structure.file)
+            self.centres = np.array(drawn.subtree_com)
+            """``(nbody, 3)`` mass centres of subtrees as drawn, world"""
+            self.base = drawn.xpos[structure.base].copy(), drawn.xmat[structure.base].reshape(3, 3).copy()
+            """position and axes of the base body, which is fixed, world"""
         # a step in metres counts by the robot's size, one in radians as it is
         self._weights = weights_of(engine.model, self.tolerance.size)
 

@@ -22,6 +22,7 @@ from workbench.arrays import FloatArray
 from workbench.errors import ModelError, ParameterError
 from workbench.mjcf.compile import engine_warnings
 from workbench.reference.frames import Frames, place_frames
+from workbench.reference.shelf import Shelf
 
 LUMPED_INERTIA = 2e-15
 """kg m^2: what stands for "no rotational inertia"; MuJoCo refuses less than 1e-15. Against the smallest bar of the two
@@ -127,12 +128,9 @@ class Evaluator:
     """Evaluates up to `BLOCK` samples at a time; one thread's own."""
 
     def __init__(self, model: mujoco.MjModel, frames: Frames = NONE) -> None:
-        # constraint forces are solved for elsewhere, so the engine need not set them up; nothing else depends on this
-        flags = mujoco.mjtDisableBit
-        lean = copy.copy(model)
-        lean.opt.disableflags |= flags.mjDSBL_CONSTRAINT.value | flags.mjDSBL_SENSOR.value
-        lean.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
-        self._batch = Batch(lean, BLOCK, 1)
+        self._batch = Batch(model, BLOCK, 1)
+        self.model = model
+        """the model that is evaluated, a `lean` one"""
         self._poses = Poses(*(self._batch.bind(name) for name in POSES))
         self._dynamics = Dynamics(*(self._batch.bind(name) for name in DYNAMICS))
         self.qpos: FloatArray = self._batch.qpos
@@ -149,6 +147,17 @@ class Evaluator:
             for array in shown:
                 array.flags.writeable = False
             self._poses = dataclasses.replace(self._poses, site_xpos=shown[0], site_xquat=shown[1])
+
+    def take_up(self, model: mujoco.MjModel, frames: Frames) -> None:
+        """From now on evaluate another model of the same layout.
+
+        Raises
+        ------
+        mujoco.FatalError
+            It has another layout.
+        """
+        self._batch.set_models(model)
+        self.model, self._frames = model, frames
 
     def place(self, ids: np.ndarray) -> Poses:
         """Evaluate positions of the listed rows of `qpos`; the arrays are valid until the next call."""
@@ -173,16 +182,28 @@ class Evaluator:
         return self._with_frames(self._all[:count]), self._dynamics
 
 
+def lean(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A copy that sets up no constraint forces, which are solved for elsewhere; nothing else depends on this."""
+    flags, found = mujoco.mjtDisableBit, copy.copy(model)
+    found.opt.disableflags |= flags.mjDSBL_CONSTRAINT.value | flags.mjDSBL_SENSOR.value
+    found.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
+    return found
+
+
 class Engine:
     """A model and its evaluators; results do not depend on the number of threads."""
 
-    def __init__(self, model: mujoco.MjModel, threads: int = 1, frames: Frames = NONE) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, threads: int = 1, frames: Frames = NONE, shelf: Shelf | None = None
+    ) -> None:
         if not 1 <= threads <= MOST_THREADS:
             raise ParameterError(f"threads = {threads}; allowed: 1 to {MOST_THREADS}", value=threads)
         self.model = model
         self.threads = threads
         self._frames = frames
-        self._idle: queue.SimpleQueue[Evaluator] = queue.SimpleQueue()
+        self.shelf = shelf or Shelf()
+        self._idle = self.shelf.evaluators
+        self._lean = lean(model)
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
     @engine_warnings()
@@ -220,9 +241,15 @@ class Engine:
 
     def _take(self) -> Evaluator:
         try:
-            return self._idle.get_nowait()
+            found = self._idle.get_nowait()
         except queue.Empty:
-            return Evaluator(self.model, self._frames)
+            return Evaluator(self._lean, self._frames)
+        if found.model is not self._lean:
+            try:
+                found.take_up(self._lean, self._frames)
+            except mujoco.FatalError:  # bodies that MuJoCo calls simple have a smaller mass matrix
+                return Evaluator(self._lean, self._frames)
+        return found
 
     def _workers(self) -> ThreadPoolExecutor:
         # a forked process has no threads, whatever its parent had

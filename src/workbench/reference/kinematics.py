@@ -28,6 +28,9 @@ JOINT_KINDS = {
     mujoco.mjtJoint.mjJNT_FREE: FLOATING,
 }
 
+KIND_OF = np.array([JOINT_KINDS[kind] for kind in sorted(JOINT_KINDS, key=lambda kind: kind.value)], dtype=np.int64)
+"""The same by MuJoCo's number."""
+
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 
@@ -87,16 +90,15 @@ def is_covered(model: mujoco.MjModel) -> bool:
     return bool(model.nmocap == 0 and model.nflex == 0 and model.nplugin == 0)
 
 
-def kinematics_of(model: mujoco.MjModel, frames: Frames, points: IntArray, home: FloatArray) -> Kinematics:
-    """Read the tables of a compiled model; *points* are the sites and frames wanted, *home* ``(nq,)`` a usual pose."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = home
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
+def kinematics_of(model: mujoco.MjModel, frames: Frames, points: IntArray, centres: FloatArray) -> Kinematics:
+    """Read the tables of a compiled model.
+
+    *points* are the sites and frames wanted, *centres* ``(nbody, 3)`` mass centres of subtrees in a usual pose, world.
+    """
     bodies = np.concatenate([np.asarray(model.site_bodyid, dtype=np.int64).reshape(-1), frames.bodies])
     positions = np.concatenate([np.asarray(model.site_pos).reshape(-1, 3), frames.positions])
     turns = np.concatenate([np.asarray(model.site_quat).reshape(-1, 4), frames.quaternions])
-    centre = np.array(data.subtree_com, dtype=np.float64)[np.asarray(model.body_rootid)]
+    centre = centres[np.asarray(model.body_rootid)]
     centre.flags.writeable = False  # as the engine's own: for the kernels another type
     return Kinematics(
         parent=np.array(model.body_parentid, dtype=np.int64),
@@ -104,7 +106,7 @@ def kinematics_of(model: mujoco.MjModel, frames: Frames, points: IntArray, home:
         body_quat=np.array(model.body_quat, dtype=np.float64),
         first=np.array(model.body_jntadr, dtype=np.int64),
         number=np.array(model.body_jntnum, dtype=np.int64),
-        kind=np.array([JOINT_KINDS[mujoco.mjtJoint(kind)] for kind in model.jnt_type], dtype=np.int64),
+        kind=KIND_OF[np.asarray(model.jnt_type)],
         joint_pos=np.array(model.jnt_pos, dtype=np.float64).reshape(-1, 3),
         joint_axis=np.array(model.jnt_axis, dtype=np.float64).reshape(-1, 3),
         qpos_of=np.array(model.jnt_qposadr, dtype=np.int64),

@@ -16,7 +16,7 @@ from workbench.errors import ModelError
 from workbench.mjcf.compile import engine_warnings
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.reference.result import ReferenceResult
-from workbench.reference.rods import ROUND, RodFrame
+from workbench.reference.rods import RodFrame
 
 
 def left_open(
@@ -50,10 +50,9 @@ def left_open(
 def _with_round_rods(reference: MujocoReference) -> mujoco.MjModel | None:
     """The model with every lopsided rod made round about its axis; None where there is none."""
     model, structure = reference.compiled(), reference.structure
-    shapes = [(rod, RodFrame(model, rod, structure.frames)) for rod in structure.rods]
-    uneven = [(rod, shape) for rod, shape in shapes if shape.unevenness().beyond(ROUND)]
-    if not uneven:
+    if not structure.lopsided:
         return None
+    uneven = [(rod, RodFrame(model, rod, structure.frames)) for rod in structure.lopsided]
     spec = reference.spec()
     for rod, shape in uneven:
         place, inertia = shape.rounded()

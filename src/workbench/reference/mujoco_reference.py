@@ -31,6 +31,7 @@ from workbench.reference.platform_side import PlatformSide
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
 from workbench.reference.result import Mobility, ReferenceResult, refuse_overflow
+from workbench.reference.shelf import shelf_of
 from workbench.reference.structure import Structure, structure_of
 from workbench.reference.tolerance import few_digits_note, rank_of
 from workbench.robots.load import LoadedModel, load_model
@@ -75,8 +76,9 @@ class MujocoReference(PlatformSide):
         self.file = loaded.file
         self.loaded = loaded
         self._threads = threads
-        self._structure = structure_of(loaded)
-        self._engines = {"distributed": Engine(loaded.model, threads, self._structure.frames)}
+        shelf = shelf_of(loaded.family)
+        self._structure = shelf.structure = structure_of(loaded, shelf.structure)
+        self._engines = {"distributed": Engine(loaded.model, threads, self._structure.frames, shelf)}
         self._mass_layout = mass_layout(loaded.model)
         self._closer = LoopCloser(self._engines["distributed"], self._structure)
         tables = self._closer.tables
@@ -129,6 +131,17 @@ class MujocoReference(PlatformSide):
     def structure(self) -> Structure:
         """Tables of actuated and passive freedoms and of loop closures."""
         return self._structure
+
+    @property
+    def closer(self) -> LoopCloser:
+        """What closes the loops, by the same rules for whoever moves the mechanism."""
+        return self._closer
+
+    @property
+    def base_position(self) -> FloatArray:
+        """``(3,)`` origin of the paper's frame, m, world."""
+        found: FloatArray = self._base_position.copy()
+        return found
 
     @property
     def base_rotation(self) -> FloatArray:
@@ -321,13 +334,9 @@ class MujocoReference(PlatformSide):
         return self._closed[1]
 
     def _locate_base(self) -> None:
-        model = self._engines["distributed"].model
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
         if self._structure.moves[self._structure.base].any():
             raise ModelError(f'{self.file}: the base body moves; <text name="base_body"> must name a fixed one')
-        self._base_rotation = data.xmat[self._structure.base].reshape(3, 3).copy()
-        self._base_position = data.xpos[self._structure.base].copy()
+        self._base_position, self._base_rotation = self._closer.base
 
     def _home_jacobian(self) -> FloatArray:
         return self._closer.jacobian(self._closer.home)
@@ -337,10 +346,11 @@ class MujocoReference(PlatformSide):
         structure, home = self._structure, self._home_jacobian()
         tolerance = self._closer.tolerance
         check_freedoms(structure, home, self._closer.jacobian_near_home, tolerance.relative)
-        if not self.mobility().mobility:
+        mobility = self.mobility().mobility
+        if not mobility:
             refuse_locked(structure, home, tolerance)
         if tolerance.few_digits:
-            excess = len(structure.actuated) - self.mobility().mobility
+            excess = len(structure.actuated) - mobility
         else:
             excess = excess_actuators(home, structure.passive, structure.actuated)
         if excess > 0:

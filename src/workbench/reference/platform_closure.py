@@ -58,15 +58,15 @@ class PlatformCloser(Continuation):
         self.task = task
         self.leading = leading
         self.home = loops.home
-        data = mujoco.MjData(model)
-        data.qpos = self.home
-        mujoco.mj_kinematics(model, data)
-        rotation = data.xmat[structure.base].reshape(3, 3).copy()
-        self._base = rotation, data.xpos[structure.base].copy(), data.xquat[structure.base].copy()
+        with self.engine.shelf.data_of(model) as data:
+            data.qpos[:] = self.home
+            mujoco.mj_kinematics(model, data)
+            rotation = data.xmat[structure.base].reshape(3, 3).copy()
+            self._base = rotation, data.xpos[structure.base].copy(), data.xquat[structure.base].copy()
+            self.size = _size(data, structure.platform_site)
+            """m: the robot's length, by which turns and distances are compared"""
         self._site = int(model.site_bodyid[structure.platform_site]), structure.platform_site
         self._table = task.table(*self._site)
-        self.size = _size(data, structure.platform_site)
-        """m: the robot's length, by which turns and distances are compared"""
         self._lengths = np.where(_turning(model), self.size, 1.0)
         if len(task.names) != len(leading):
             has = " ".join(self._has(loops))

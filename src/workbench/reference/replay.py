@@ -259,7 +259,7 @@ class _Runner:
         batch = Batch(model, count, 1)
         batch.qpos = np.repeat(self._initial.qpos, count, axis=0)
         batch.qvel = np.repeat(self._initial.qvel, count, axis=0)
-        with _quiet():
+        with quiet():
             record = batch.rollout(steps, applied, mujoco.mjtState.mjSTATE_QFRC_APPLIED.value, record=("qpos",))
         followed = record["qpos"][:, every - 1 :: every, :][:, :, structure.actuated_qpos]
         course = self._motion_at(_times(self._start + every * step, every * step, steps // every))[0]
@@ -280,7 +280,7 @@ class _Runner:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Keep MuJoCo from writing "unstable" to the terminal and to MUJOCO_LOG.TXT: that is a verdict here."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)

@@ -11,6 +11,7 @@ are no good measure, the two Jacobians themselves are compared.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -147,43 +148,58 @@ def side_table(jacobian: FloatArray, pattern: np.ndarray, group: IntArray, colum
         ``(p,)`` velocity addresses.
     """
     from scipy.linalg import qr
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
     m, p = jacobian.shape
     if m < p or not p or np.linalg.matrix_rank(jacobian) < p:
         return NO_SIDES
     chosen = np.arange(m) if m == p else np.sort(qr(jacobian.T, mode="r", pivoting=True)[1][:p])
-    square = pattern[chosen]
-    # the column that stands for each row on the diagonal of the triangular form
-    matched = np.asarray(maximum_bipartite_matching(csr_array(square), perm_type="column"), dtype=np.int64)
-    if (matched < 0).any():
+    blocks = _blocks(pattern.tobytes(), pattern.shape[1], tuple(group.tolist()), tuple(chosen.tolist()))
+    if not blocks:
         return NO_SIDES
-    depends = np.zeros((p, p), dtype=np.bool_)
-    depends[matched] = square
-    for one in np.unique(group[chosen]):
-        together = matched[group[chosen] == one]
-        depends[np.ix_(together, together)] = True
-    count, labels = connected_components(csr_array(depends), connection="strong")
-    rows, places, group_rows, sizes, least = [], [], [], [], []
-    for block in range(count):
-        mine = np.flatnonzero(labels == block)
-        own = chosen[np.isin(matched, mine)]
-        whole = np.flatnonzero(np.isin(group, group[own]))
-        rows.append(own)
-        places.append(mine)
-        group_rows.append(whole)
-        sizes.append(float(np.exp(np.linalg.slogdet(jacobian[np.ix_(own, mine)])[1] / len(mine))))
-        least.append(POOR if len(whole) > len(own) else 0.0)
+    rows, places, group_rows = ([block[k] for block in blocks] for k in range(3))
+    sizes = [float(np.exp(np.linalg.slogdet(jacobian[np.ix_(own, mine)])[1] / len(mine))) for own, mine, _ in blocks]
     return SideTable(
         np.concatenate(rows).astype(np.int64),  # pivots of LAPACK are shorter, and another type for the kernels
         np.asarray(columns, dtype=np.int64)[np.concatenate(places)],
         _starts(rows),
         np.array(sizes),
-        np.array(least),
+        np.array([POOR if len(whole) > len(own) else 0.0 for own, _, whole in blocks]),
         _starts(group_rows),
         np.concatenate(group_rows),
     )
+
+
+@lru_cache(maxsize=64)
+def _blocks(
+    pattern: bytes, columns: int, group: tuple[int, ...], chosen: tuple[int, ...]
+) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]:
+    """Blocks of the triangular form of the *chosen* rows: rows, columns, and all rows of the closures in it.
+
+    They follow from where entries may differ from zero alone, and many variants of a mechanism have the same. Empty
+    where the form has a zero on its diagonal.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
+
+    entries = np.frombuffer(pattern, dtype=np.bool_).reshape(-1, columns)
+    groups, rows = np.array(group, dtype=np.int64), np.array(chosen, dtype=np.int64)
+    square = entries[rows]
+    # the column that stands for each row on the diagonal of the triangular form
+    matched = np.asarray(maximum_bipartite_matching(csr_array(square), perm_type="column"), dtype=np.int64)
+    if (matched < 0).any():
+        return ()
+    depends = np.zeros((columns, columns), dtype=np.bool_)
+    depends[matched] = square
+    for one in np.unique(groups[rows]):
+        together = matched[groups[rows] == one]
+        depends[np.ix_(together, together)] = True
+    count, labels = connected_components(csr_array(depends), connection="strong")
+    found = []
+    for block in range(count):
+        mine = np.flatnonzero(labels == block)
+        own = rows[np.isin(matched, mine)]
+        found.append((own, mine, np.flatnonzero(np.isin(groups, groups[own]))))
+    return tuple(found)
 
 
 def _starts(parts: list[np.ndarray]) -> IntArray:

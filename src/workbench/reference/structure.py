@@ -5,7 +5,7 @@ Names are resolved here, once; whatever the projection does not cover is refused
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -93,6 +93,8 @@ class Structure:
     """the rods of `idle`"""
     notes: tuple[str, ...] = ()
     """what a reader of the results should know of the model, one line each"""
+    lopsided: tuple[Rod, ...] = ()
+    """rods that are no bodies of revolution, to six digits"""
 
     @property
     def rows(self) -> int:
@@ -140,8 +142,10 @@ def _read(model: mujoco.MjModel) -> _Found:
     return _Found(closures, base, site, judged, found + missing + lost + [r for _, r, _ in judged if r is not None])
 
 
-def structure_of(loaded: LoadedModel) -> Structure:
+def structure_of(loaded: LoadedModel, known: Structure | None = None) -> Structure:
     """`read_structure` of a loaded file; what is refused stands on its line.
+
+    *known* is the structure of another model of the same family, `LoadedModel.family`.
 
     Raises
     ------
@@ -149,13 +153,13 @@ def structure_of(loaded: LoadedModel) -> Structure:
         As `read_structure`.
     """
     try:
-        return read_structure(loaded.model, loaded.file)
+        return read_structure(loaded.model, loaded.file, known)
     except ModelError as error:
         raise (with_lines(error, loaded.prepared.source) if loaded.prepared else error) from None
 
 
-def read_structure(model: mujoco.MjModel, file: str) -> Structure:
-    """Resolve the tables of *model*.
+def read_structure(model: mujoco.MjModel, file: str, known: Structure | None = None) -> Structure:
+    """Resolve the tables of *model*; names and tree are those of *known*, where that is given.
 
     Raises
     ------
@@ -167,6 +171,8 @@ def read_structure(model: mujoco.MjModel, file: str) -> Structure:
     found = _read(model)
     if found.refusals:
         raise joined(file, found.refusals)
+    if known is not None and _made_alike(known, found):
+        return _with_numbers(known, model, found)
     obj = mujoco.mjtObj
     joints = [int(model.actuator_trnid[a, 0]) for a in range(model.nu)]
     actuated = np.array([model.jnt_dofadr[j] for j in joints], dtype=np.int64)
@@ -183,7 +189,6 @@ def read_structure(model: mujoco.MjModel, file: str) -> Structure:
     passive = np.array([d for d in range(model.nv) if d not in set(actuated.tolist())], dtype=np.int64)
     columns = np.full(model.nv, -1, dtype=np.int64)
     columns[passive] = np.arange(len(passive))
-    home = mujoco.mj_name2id(model, obj.mjOBJ_KEY, "home")
     tendons = fixed_tendons(model)
     return Structure(
         file=file,
@@ -201,13 +206,42 @@ def read_structure(model: mujoco.MjModel, file: str) -> Structure:
         base=found.base,
         platform_site=site,
         idle=idle,
-        home_qpos=np.array(model.key_qpos[home] if home >= 0 else model.qpos0, dtype=np.float64),
+        home_qpos=_drawn(model),
         columns=columns,
         frames=Frames.of(closures.frames),
         tendons=tendons,
         friction=_friction(model, actuated, tendons),
         rods=rods,
         notes=tuple(note for _, _, note in judged if note),
+        lopsided=tuple(rod for rod, _, note in judged if note),
+    )
+
+
+def _drawn(model: mujoco.MjModel) -> FloatArray:
+    home = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, "home")
+    return np.array(model.key_qpos[home] if home >= 0 else model.qpos0, dtype=np.float64)
+
+
+def _made_alike(known: Structure, found: _Found) -> bool:
+    """Whether closures and rods are the known ones: which they are, too, follows from numbers in places."""
+    blocks = [*found.closures.blocks, *(spin_block(rod) for rod, _, _ in found.judged)]
+    same = known.blocks.tolist() == [list(block) for block in blocks]
+    return same and tuple(rod for rod, _, _ in found.judged) == known.rods
+
+
+def _with_numbers(known: Structure, model: mujoco.MjModel, found: _Found) -> Structure:
+    """All that follows from a model's numbers, read anew."""
+    zeros = [np.zeros(5) for _ in known.rods]
+    tendons = fixed_tendons(model)
+    return replace(
+        known,
+        polynomials=np.array([*found.closures.polynomials, *zeros], dtype=np.float64).reshape(-1, 5),
+        home_qpos=_drawn(model),
+        frames=Frames.of(found.closures.frames),
+        tendons=tendons,
+        friction=_friction(model, known.actuated, tendons),
+        notes=tuple(note for _, _, note in found.judged if note),
+        lopsided=tuple(rod for rod, _, note in found.judged if note),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -46,8 +47,12 @@ class Tables:
     """parent, root, first velocity address and number of velocities of each body"""
 
 
-def tables_of(model: mujoco.MjModel, structure: Structure) -> Tables:
-    """Collect the tables of one model."""
+def tables_of(model: mujoco.MjModel, structure: Structure, known: Tables | None = None) -> Tables:
+    """Collect the tables of one model; *known* are those of another one with the same tree and the same closures."""
+    if known is not None and known.closures.blocks is structure.blocks:
+        split = structure.passive, structure.actuated
+        closures = known.closures._replace(polynomials=structure.polynomials, tendons=structure.tendons)
+        return dataclasses.replace(known, closures=closures, split=split)
     depth = structure.moves.sum(axis=1).astype(np.int64)
     moving = np.zeros((model.nbody, max(1, int(depth.max(initial=0)))), dtype=np.int64)
     for body, moves in enumerate(structure.moves):

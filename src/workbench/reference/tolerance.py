@@ -71,18 +71,15 @@ class Tolerance:
         return SPREAD * self.allowed if self.few_digits else INCONSISTENT * self.size
 
 
-def tolerance_of(model: mujoco.MjModel, home: FloatArray, file: str) -> Tolerance:
-    """Measure a model in its home pose ``(nq,)``.
+def tolerance_of(model: mujoco.MjModel, drawn: mujoco.MjData, file: str) -> Tolerance:
+    """Measure a model in its home pose, in which *drawn* has its positions.
 
     Raises
     ------
     ModelError
         A closure tolerance that is no positive number.
     """
-    data = mujoco.MjData(model)
-    data.qpos[:] = home
-    mujoco.mj_kinematics(model, data)
-    places = np.vstack([data.xpos[1:], data.site_xpos]) if model.nbody > 1 else np.zeros((1, 3))
+    places = np.vstack([drawn.xpos[1:], drawn.site_xpos]) if model.nbody > 1 else np.zeros((1, 3))
     size = max(1.0, float(np.linalg.norm(np.ptp(places, axis=0))))
     far = max(1.0, float(np.abs(places).max(initial=0.0)))
     said = custom_text(model, KEY)
@@ -121,9 +118,9 @@ def few_digits_note(tolerance: Tolerance, gap: float) -> str:
 def weights_of(model: mujoco.MjModel, size: float) -> tuple[FloatArray, FloatArray]:
     """What a unit of each velocity ``(nv,)`` and of each coordinate ``(nq,)`` counts: lengths by the robot's size."""
     velocities, coordinates = np.ones(model.nv), np.ones(model.nq)
-    for joint in range(model.njnt):
-        kind = mujoco.mjtJoint(model.jnt_type[joint])
-        lengths = {mujoco.mjtJoint.mjJNT_SLIDE: 1, mujoco.mjtJoint.mjJNT_FREE: 3}.get(kind, 0)
-        for array, first in ((velocities, model.jnt_dofadr[joint]), (coordinates, model.jnt_qposadr[joint])):
-            array[first : first + lengths] = 1.0 / size
+    kinds = np.asarray(model.jnt_type)
+    for kind, lengths in ((mujoco.mjtJoint.mjJNT_SLIDE, 1), (mujoco.mjtJoint.mjJNT_FREE, 3)):
+        joints = np.flatnonzero(kinds == kind.value)
+        for array, first in ((velocities, model.jnt_dofadr), (coordinates, model.jnt_qposadr)):
+            array[np.asarray(first)[joints][:, None] + np.arange(lengths)] = 1.0 / size
     return velocities, coordinates

@@ -123,7 +123,7 @@ def varied_reference(
         element.fullinertia = [np.nan] * 6
         element.inertia = np.maximum(inertias[body], LUMPED_INERTIA) if masses[body] else inertias[body]
     spec.compiler.balanceinertia = False
-    return MujocoReference(base.file, loaded=LoadedModel(base.file, base.loaded.text, _compiled(spec)))
+    return MujocoReference(base.file, loaded=LoadedModel(base.file, base.loaded.writing, _compiled(spec)))
 
 
 def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:

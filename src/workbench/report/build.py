@@ -19,6 +19,8 @@ from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
 from workbench.report import kept_drawings
 from workbench.report.bibliography import NAME, bibliography, cited_keys
+from workbench.report.control.load import StudyRun, load_study
+from workbench.report.control.sections import study_sections
 from workbench.report.cost import cost_table
 from workbench.report.drawing import Show, draw
 from workbench.report.latex import latex_table
@@ -85,8 +87,11 @@ def build_report(
     _check_choice("paper", [paper], PAPERS)
     run_dir = Path(run_dir)
     manifest = read_manifest(run_dir)
-    run: Run | SweepRun
-    if manifest.sweep is None:
+    run: Run | SweepRun | StudyRun
+    if manifest.control is not None:
+        run = load_study(run_dir, manifest)
+        sections = study_sections(run)
+    elif manifest.sweep is None:
         run = load_run(run_dir)
         sections = build_sections(run)
     else:
@@ -95,8 +100,9 @@ def build_report(
     with figure_style(style), _few_collections():
         files = _rendered(run, sections, formats, style, paper, show, second)
     wanted = tuple(name for name in formats if name in DATA_FORMATS)
-    if wanted and manifest.sweep is not None:
-        raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; a sweep's data are Parquet")
+    if wanted and not isinstance(run, Run):
+        kind = "a sweep's" if isinstance(run, SweepRun) else "a study's"
+        raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; {kind} data are Parquet")
     if wanted:
         from workbench.report.data_out import data_files  # pandas takes longer to load than a page to write
 
@@ -126,7 +132,7 @@ def _check_choice(what: str, given: Sequence[str], allowed: Iterable[str]) -> No
 
 
 def _rendered(
-    run: Run | SweepRun,
+    run: Run | SweepRun | StudyRun,
     sections: list[Section],
     formats: Sequence[str],
     style: str,
@@ -182,7 +188,7 @@ class _Steps:
             self._show(done, self.total)
 
 
-def render_html(run: Run | SweepRun, sections: list[Section]) -> str:
+def render_html(run: Run | SweepRun | StudyRun, sections: list[Section]) -> str:
     """Return the whole page."""
     return html_page("report.html.j2", sections, _head(run))
 
@@ -211,7 +217,7 @@ def html_page(template: str, sections: Sequence[Section], head: Mapping[str, Any
     return _without_blank_lines(text)
 
 
-def _head(run: Run | SweepRun) -> dict[str, Any]:
+def _head(run: Run | SweepRun | StudyRun) -> dict[str, Any]:
     """What stands over the sections."""
     return {
         "manifest": run.manifest,
@@ -235,7 +241,7 @@ def _without_blank_lines(text: str) -> str:
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip()) + "\n"
 
 
-def render_markdown(run: Run | SweepRun, sections: list[Section]) -> str:
+def render_markdown(run: Run | SweepRun | StudyRun, sections: list[Section]) -> str:
     """Return the report as Markdown that shows figures/*.svg."""
     environment = _environment()
     environment.finalize = finalize_markdown

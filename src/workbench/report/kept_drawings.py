@@ -14,7 +14,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import workbench
 from workbench.report.plot import Plot
 from workbench.report.svg import standalone
 
@@ -29,7 +28,7 @@ _ELSEWHERE = re.compile(r'href="(?!#|data:image/png;base64,)|<script|<!DOCTYPE|@
 def digest_of(run_dir: Path) -> str:
     """Tell results and drawing code from all others, SHA-256."""
     found = hashlib.sha256(repr([(name, version(name)) for name in LIBRARIES]).encode())
-    package = Path(workbench.__file__).parent
+    package = Path(__file__).parents[1]
     stored = [run_dir / "manifest.json", run_dir / "summary.csv", *sorted((run_dir / "series").glob("*"))]
     for root, paths in ((package, sorted(package.rglob("*.py"))), (run_dir, stored)):
         for path in paths:

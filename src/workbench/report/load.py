@@ -141,6 +141,12 @@ def load_run(directory: Path) -> Run:
         One line that names the file, the key or line, the value and what is allowed.
     """
     manifest = read_manifest(directory)
+    if manifest.control is not None:
+        raise OutputError(
+            f"{directory}: holds a study of {manifest.control.runs} runs under control, where this needs a run of"
+            " cases; its numbers are in control.json, runs.parquet and errors.parquet",
+            path=str(directory),
+        )
     if manifest.sweep is not None:
         raise OutputError(
             f"{directory}: holds a sweep of {manifest.sweep.cases} cases, where this needs a run without one; "

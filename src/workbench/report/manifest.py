@@ -343,6 +343,14 @@ class SweepRecord(Record):
     counts: dict[str, int] = Field(default_factory=dict)
 
 
+class ControlRecord(Record):
+    """That the run is a study of control: then its runs stand in tables and not here."""
+
+    runs: int
+    limits: dict[str, float] = Field(default_factory=dict)
+    """largest torques, by joint, where they were heeded"""
+
+
 class Manifest(Record):
     """manifest.json."""
 
@@ -384,6 +392,7 @@ class Manifest(Record):
     cases: dict[str, CaseRecord]
     diagnosis: dict[str, DiagnosisRecord] = Field(default_factory=dict)
     sweep: SweepRecord | None = None
+    control: ControlRecord | None = None
 
     def unit_of(self, joint: str) -> str:
         """Unit of the force or torque of *joint*."""

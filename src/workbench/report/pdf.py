@@ -22,6 +22,7 @@ from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
 from workbench.records import reason
 from workbench.report.case_section import CaseView
+from workbench.report.control.load import StudyRun
 from workbench.report.cost import cost_table
 from workbench.report.load import Run
 from workbench.report.pictures import MOST_PIXELS
@@ -53,7 +54,9 @@ FIGURE = """#set document(date: none)
 Block = dict[str, Any]
 
 
-def report_pdf(run: Run | SweepRun, sections: Sequence[Section], style: str = "page", paper: str = "a4") -> bytes:
+def report_pdf(
+    run: Run | SweepRun | StudyRun, sections: Sequence[Section], style: str = "page", paper: str = "a4"
+) -> bytes:
     """Return the whole report as PDF, on *paper* (a key of `PAPERS`); the same results give the same bytes."""
     manifest = run.manifest
     parts: dict[str, str] = {}

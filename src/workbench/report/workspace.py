@@ -41,7 +41,7 @@ def draw_workspace(directory: Path, paths: Mapping[str, FloatArray] | None = Non
     """
     try:
         facts = json.loads((directory / FACTS).read_text(encoding="utf-8"))
-        cells = pd.read_parquet(directory / CELLS)
+        cells = pd.read_parquet(directory / CELLS, page_checksum_verification=True)
     except (OSError, ValueError) as error:
         raise OutputError(f"{directory}: holds no readable workspace: {error}", path=str(directory)) from error
     marked = dict(paths or {})

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import mujoco
@@ -29,6 +29,7 @@ from workbench.robots.inertia import refuse_impossible_bodies
 from workbench.robots.parameters import Target
 from workbench.robots.robot_file import RobotFile
 from workbench.robots.values import is_written, quotient, read_number, read_parameters, rewrite
+from workbench.robots.variants import Variants
 
 NAMES_FILES = re.compile(r"\bfile\s*=")
 """Of an include, a mesh, a picture, an attached model: a text with it may mean something else when it is read again."""
@@ -39,8 +40,8 @@ class LoadedModel:
     """An MJCF after overrides: as the user wrote it, as the reference sees it, and the robot that it describes."""
 
     file: str
-    text: str
-    """the user's own, with the overrides written into it"""
+    writing: Callable[[], str] = field(repr=False)
+    """how `text` is made"""
     model: mujoco.MjModel
     """as the reference sees it: actuators, platform and first guess put into it"""
     description: Description | None = None
@@ -51,6 +52,13 @@ class LoadedModel:
     """why they cannot be read, one line"""
     prepared: Prepared | None = None
     """the file with all that it reads, and how its specification is made"""
+    family: object = None
+    """the same for models that were compiled from one specification and differ in nothing but numbers"""
+
+    @cached_property
+    def text(self) -> str:
+        """The user's own, with the overrides written into it."""
+        return self.writing()
 
     def spec(self) -> mujoco.MjSpec:
         """A fresh specification of `model`, to be changed and compiled."""
@@ -127,6 +135,9 @@ def with_overrides(base: Base, overrides: Mapping[str, float]) -> LoadedModel:
         raise no_parameters(file)
     wanted = described.table.changed(values, overrides)
     refuse_computed(base, described.table.expand(overrides), values)
+    quickly = base.variants.loaded(base, wanted)
+    if quickly is not None:
+        return quickly
     refuse_impossible_bodies(base.model, described, file, values, wanted)
     text = rewrite(base.model, loaded.text, file, described, values, wanted, base.elements)
     return _confirmed(base, text, described, wanted)
@@ -179,6 +190,8 @@ class Base:
     setup: Setup | None
     computed: Mapping[str, Target]
     """parameters whose number does not stand in the file -> their place"""
+    variants: Variants = field(default_factory=Variants, repr=False, compare=False)
+    """how variants are made where there are many"""
 
 
 def read_base(path: str | Path, setup: Setup | None = None, robot: RobotFile | None = None) -> Base:
@@ -227,7 +240,7 @@ def _loaded(
     values: Mapping[str, float] | None = None,
     problem: str = "",
 ) -> LoadedModel:
-    return LoadedModel(file, text, prepared.model, described, values, problem, prepared)
+    return LoadedModel(file, lambda: text, prepared.model, described, values, problem, prepared)
 
 
 def _prepared(whole: Prepared, file: str, setup: Setup | None) -> Prepared:

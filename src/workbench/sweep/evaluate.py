@@ -145,7 +145,7 @@ def evaluate(context: Context, base: Robot, task: Task) -> Answer:
 def series_bytes(result: CaseResult) -> bytes:
     """Return the time series as they stand in ``series/<case>.parquet``; the same numbers give the same bytes."""
     buffer = io.BytesIO()
-    pd.DataFrame(dict(result.series)).to_parquet(buffer, index=False)
+    pd.DataFrame(dict(result.series)).to_parquet(buffer, index=False, write_page_checksum=True)
     return buffer.getvalue()
 
 

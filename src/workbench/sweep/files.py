@@ -127,7 +127,7 @@ def write_parts(directory: Path, plan: Plan, journal: Journal) -> None:
 def _write_table(path: Path, table: pa.Table) -> None:
     # by way of memory: Arrow opens no file whose name is not UTF-8
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd")
+    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     path.write_bytes(sink.getvalue())
 
 
@@ -163,7 +163,9 @@ def _summary_table(plan: Plan, records: Sequence[Record]) -> pa.Table:
 
 def _read_table(path: Path) -> list[dict[str, Any]]:
     buffer = pa.BufferReader(reading.read_bytes(path, LARGEST_PART))
-    rows: list[dict[str, Any]] = pq.ParquetFile(buffer).read(use_threads=False).to_pylist()
+    rows: list[dict[str, Any]] = (
+        pq.ParquetFile(buffer, page_checksum_verification=True).read(use_threads=False).to_pylist()
+    )
     return rows
 
 

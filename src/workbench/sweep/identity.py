@@ -29,6 +29,7 @@ CODE = (
     "delimited",
     "reference",
     "campaign",
+    "control",
     "sweep",
     "metrics.py",
     "arrays.py",

@@ -74,7 +74,7 @@ def _statuses(directory: Path) -> tuple[Counter[str], Counter[tuple[str, str]], 
     reasons: Counter[tuple[str, str]] = Counter()
     examples: dict[tuple[str, str], str] = {}
     for path in sorted((directory / files.CASES).glob("part-*.parquet")):
-        table = pq.read_table(path, columns=["case", "status", "reason"]).to_pydict()
+        table = pq.read_table(path, columns=["case", "status", "reason"], page_checksum_verification=True).to_pydict()
         statuses.update(table["status"])
         for case, status, reason in zip(table["case"], table["status"], table["reason"], strict=True):
             if reason:
@@ -91,7 +91,8 @@ def _errors(directory: Path, plan: Plan, campaign: Campaign) -> dict[tuple[str, 
     pairs = [(c.name, c.reference) for c in campaign.candidate]
     found = {pair: {joint: np.full(plan.count, np.nan) for joint in joints} for pair in pairs}
     for path in sorted((directory / files.SUMMARY).glob("part-*.parquet")):
-        table = pq.read_table(path, columns=["index", "candidate", "reference", "joint", "kind", "peak_error"])
+        names = ["index", "candidate", "reference", "joint", "kind", "peak_error"]
+        table = pq.read_table(path, columns=names, page_checksum_verification=True)
         index = table.column("index").to_numpy()
         value = table.column("peak_error").to_numpy()
         labels = [np.asarray(table.column(n).to_pylist(), dtype=object) for n in ("candidate", "reference", "joint")]

@@ -84,10 +84,15 @@ class _Sweep(Record):
     counts: dict[str, Annotated[int, Field(ge=0, le=10**12)]] = Field(default_factory=dict)
 
 
+class _Control(Record):
+    runs: Annotated[int, Field(ge=0, le=10**9)]
+
+
 class _Manifest(Record):
     campaign: str = ""
     cases: dict[str, _Case]
     sweep: _Sweep | None = None
+    control: _Control | None = None
 
 
 class _Progress(Record):
@@ -101,7 +106,9 @@ class _State(Record):
 
 
 def _finished(manifest: _Manifest) -> RunStatus:
-    if manifest.sweep is not None:
+    if manifest.control is not None:
+        counts = {"passed": manifest.control.runs}
+    elif manifest.sweep is not None:
         counts = dict(manifest.sweep.counts)
     else:
         counts = dict(Counter(case.status for case in manifest.cases.values()))

@@ -13,6 +13,7 @@ import signal
 import subprocess
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, BinaryIO
@@ -27,6 +28,12 @@ FAILED_STARTS = 20
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 """A worker is one thread: there are as many workers as cores, and each thread more takes memory."""
+
+AHEAD = 3
+"""Tasks that a worker with quick ones holds: what it computes and what comes next, so that it never waits for more."""
+
+QUICK_S = 0.25
+"""A worker whose last task took longer holds one: what waits behind a long task could be another worker's."""
 
 Setup = Callable[[], Callable[[Any], Any]]
 """Called once in each worker; returns the function that is called with each task. Both travel by pickle."""
@@ -50,7 +57,10 @@ class _Worker:
             start_new_session=True,
         )  # fmt: skip
         self.ready = False
-        self.task: tuple[int, Any] | None = None
+        self.tasks: deque[tuple[int, Any]] = deque()
+        """the first is being computed"""
+        self.ahead = 1
+        self.begun = 0.0
         self.deadline = float("inf")
         self.timed_out = False
         self._write(setup)
@@ -73,10 +83,24 @@ class _Worker:
             inbox.put((self, None))
 
     def give(self, index: int, task: Any, time_limit: float) -> None:
-        self.task = (index, task)
-        self.deadline = time.monotonic() + time_limit
+        if not self.tasks:
+            self._start(time_limit)
+        self.tasks.append((index, task))
         data = pickle.dumps(task, protocol=pickle.HIGHEST_PROTOCOL)
         self._write(HEADER.pack(len(data)) + data)
+
+    def done(self, time_limit: float) -> int:
+        """Its first task is answered; the clock of the next one starts. Returns the number of the first."""
+        index, _ = self.tasks.popleft()
+        self.ahead = AHEAD if time.monotonic() - self.begun < QUICK_S else 1
+        self.deadline = float("inf")
+        if self.tasks:
+            self._start(time_limit)
+        return index
+
+    def _start(self, time_limit: float) -> None:
+        self.begun = time.monotonic()
+        self.deadline = self.begun + time_limit
 
     def kill(self) -> None:
         self.process.kill()
@@ -139,8 +163,9 @@ class Supervisor:
         exhausted = False
         while True:
             while not exhausted or self._again:
-                worker = next((w for w in self._workers if w.ready and w.task is None), None)
-                if worker is None:
+                ready = [w for w in self._workers if w.ready and not w.timed_out and len(w.tasks) < w.ahead]
+                worker = min(ready, key=lambda w: len(w.tasks), default=None)
+                if worker is None or (worker.tasks and len(self._workers) < self._jobs):
                     if len(self._workers) >= self._jobs:
                         break
                     self._hire()
@@ -150,7 +175,7 @@ class Supervisor:
                     exhausted = True
                     break
                 worker.give(*task, self._time_limit)
-            if exhausted and not self._again and all(w.task is None for w in self._workers):
+            if exhausted and not self._again and not any(w.tasks for w in self._workers):
                 return
             found = self._wait()
             if found is not None:
@@ -190,28 +215,31 @@ class Supervisor:
             raise WorkbenchError(f"workers do not start: {content}")
         if kind == NO_MEMORY:
             return self._bury(worker, memory=True)
-        assert worker.task is not None
-        index, _ = worker.task
-        worker.task, worker.deadline = None, float("inf")
+        index = worker.done(self._time_limit)
         self._attempts.pop(index, None)
         if worker.timed_out:  # it answered in the moment that it was killed; the answer counts
+            self._again += worker.tasks
+            worker.tasks.clear()
             self._dismiss(worker)
         return index, content if kind == DONE else Lost(FAILED, content) if kind == RAISED else Lost(KILLED, kind)
 
     def _dismiss(self, worker: _Worker) -> int:
         self._workers.remove(worker)
-        return worker.close()
+        code = worker.close()
+        # what it had not begun is another's; the first one is dealt with by whoever dismisses it
+        self._again += list(worker.tasks)[:0:-1]
+        return code
 
     def _bury(self, worker: _Worker, memory: bool = False) -> tuple[int, Any] | None:
         """A worker is gone: try its task again, or give it up."""
         code = self._dismiss(worker)
-        if worker.task is None:
+        if not worker.tasks:
             if not worker.ready:
                 self._failed_starts += 1
                 if self._failed_starts >= FAILED_STARTS:
                     raise WorkbenchError(f"workers do not start: {self._failed_starts} in a row ended by {cause(code)}")
             return None
-        index, task = worker.task
+        index, task = worker.tasks[0]
         attempt = self._attempts.get(index, 0) + 1
         if attempt <= self._retries and not memory:
             self._attempts[index] = attempt

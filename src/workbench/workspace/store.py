@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +35,11 @@ WORKSPACE = DirectoryKind(
 )
 
 
-def workspace_facts(workspace: Workspace, robot: Robot) -> dict[str, Any]:
-    """What ``workspace.json`` holds; lengths in metres, keys documented in docs/workspace.md."""
+def workspace_facts(workspace: Workspace, robot: Robot, marked: Iterable[str] = ()) -> dict[str, Any]:
+    """What ``workspace.json`` holds; lengths in metres, keys documented in docs/workspace.md.
+
+    *marked*: cases of a campaign whose ways are drawn into the figures.
+    """
     names = [robot.platform_axes[i] for i in workspace.axes]
     upright = {"xyz"[i]: value for i, value in enumerate(robot.up) if value}
     coordinate, sign = next(iter(upright.items()))
@@ -64,6 +67,7 @@ def workspace_facts(workspace: Workspace, robot: Robot) -> dict[str, Any]:
             name: [float(workspace.x[:, i].min()), float(workspace.x[:, i].max())] for i, name in enumerate(names)
         },
         "parameters": dict(robot.values),
+        "marked": list(marked),
     }
 
 
@@ -90,6 +94,9 @@ def refuse_other(directory: Path, facts: Mapping[str, Any]) -> None:
         return
     now = json.loads(json.dumps({key: facts[key] for key in OWN if key in facts}))
     unlike = [OWN[key] for key, value in now.items() if key in old and old[key] != value]
+    before = old.get("marked")
+    if "marked" in facts and isinstance(before, list) and not {str(one) for one in before} <= set(facts["marked"]):
+        unlike.append("marked cases")
     if unlike:
         raise OutputError(
             f"{directory}: holds an earlier workspace with {', '.join(unlike)} unlike this one's; --replace puts"
@@ -98,13 +105,12 @@ def refuse_other(directory: Path, facts: Mapping[str, Any]) -> None:
         )
 
 
-def write_workspace(stage: Path, workspace: Workspace, robot: Robot) -> None:
+def write_workspace(stage: Path, workspace: Workspace, facts: Mapping[str, Any], robot: Robot) -> None:
     """Write both files into a directory that exists."""
     columns: dict[str, Any] = {f"i{k + 1}": workspace.index[:, k] for k in range(len(workspace.shape))}
     columns |= {f"x{k + 1}": workspace.x[:, k] for k in range(len(workspace.shape))}
     columns |= {joint: workspace.q[:, k] for k, joint in enumerate(robot.joints)}
     columns |= {f"measure_{name}": values for name, values in workspace.measures.items()}
     columns["condition"] = workspace.condition
-    pd.DataFrame(columns).to_parquet(stage / CELLS, index=False)
-    text = json.dumps(workspace_facts(workspace, robot), indent=1)
-    (stage / FACTS).write_text(text + "\n", encoding="utf-8")
+    pd.DataFrame(columns).to_parquet(stage / CELLS, index=False, write_page_checksum=True)
+    (stage / FACTS).write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")

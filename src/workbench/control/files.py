@@ -1,0 +1,82 @@
+"""The files of a study's run directory; docs/control.md says what each holds."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from workbench.campaign import store
+from workbench.control.plan import Loop
+from workbench.staging import DirectoryKind
+from workbench.sweep import files
+from workbench.sweep.journal import NAME as JOURNAL
+from workbench.sweep.journal import Journal
+from workbench.sweep.record import Record
+
+CONTROL = "control.json"
+RUNS = "runs.parquet"
+ERRORS = "errors.parquet"
+
+FINISHED = (files.STATE, CONTROL, RUNS, ERRORS, JOURNAL, store.MANIFEST, *store.REPORTS)
+RUN = DirectoryKind(
+    what="run",
+    marker=files.STATE,
+    keys=frozenset({"format", "campaign", "versions"}),
+    members=(*FINISHED, files.PROGRESS, *(f".{name}.part" for name in FINISHED), f".{files.PROGRESS}.part"),
+)
+
+LOOP_COLUMNS = ("case", "controller", "model", "speed", "rate", "rate_asked", "bandwidth")
+ERROR_COLUMNS = (
+    "joint", "rms", "peak", "rms_halved", "rms_second", "effort", "largest", "saturated",
+)  # fmt: skip
+"""What a row of a run holds; see docs/control.md."""
+
+
+def write_tables(directory: Path, loops: Sequence[Loop], records: Sequence[Record]) -> None:
+    """Write ``runs.parquet`` and ``errors.parquet``, in the study's order; the same runs give the same bytes.
+
+    Raises
+    ------
+    OSError
+        The system refuses a write.
+    """
+    runs, errors = [], []
+    for loop, record in zip(loops, records, strict=True):
+        place = {"index": record.index, **{name: getattr(loop, name) for name in LOOP_COLUMNS}}
+        facts = {name: record.facts.get(name) for name in ("ended", "agreed", "work", "spread")}
+        runs.append({**place, "status": record.status, "reason": record.reason, "key": record.key, **facts})
+        errors += [{**place, **{name: row[name] for name in ERROR_COLUMNS}} for row in record.rows]
+    numbers = ("speed", "rate", "bandwidth", "ended", "agreed", "work", "spread", *ERROR_COLUMNS[1:])
+    for name, rows, columns in (
+        (RUNS, runs, ("index", *LOOP_COLUMNS, "status", "reason", "key", "ended", "agreed", "work", "spread")),
+        (ERRORS, errors, ("index", *LOOP_COLUMNS, *ERROR_COLUMNS)),
+    ):
+        frame = pd.DataFrame(rows, columns=list(columns))
+        for column in columns:
+            if column in numbers:
+                frame[column] = frame[column].astype(float)
+        buffer = io.BytesIO()
+        frame.to_parquet(buffer, index=False)
+        files.write_bytes(directory / name, buffer.getvalue())
+
+
+def write_journal(directory: Path, records: Sequence[Record]) -> None:
+    """Write the journal again in the study's order: what is finished can be gone on with, and is the same bytes."""
+    files.write_bytes(directory / JOURNAL, b"".join(record.line() for record in records))
+
+
+def clear(directory: Path) -> None:
+    """Remove what an earlier study computed; reports are written over."""
+    for name in (*FINISHED[:6], files.PROGRESS):
+        path = directory / name
+        if path.exists() or path.is_symlink():
+            os.unlink(path)
+
+
+def read_all(journal: Journal, count: int) -> list[Record]:
+    """All records, in order."""
+    return [journal.read(index) for index in range(count)]

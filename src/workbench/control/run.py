@@ -1,0 +1,289 @@
+"""Run a study: what is missing is computed by workers and kept run by run, in the journal that sweeps keep."""
+
+from __future__ import annotations
+
+import shlex
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from workbench.campaign import store
+from workbench.campaign.changes import Variant, changes_of
+from workbench.campaign.conclusion import FAILED, INCOMPLETE, PASSED, Conclusion
+from workbench.campaign.lock import locked
+from workbench.campaign.manifest import describe
+from workbench.campaign.replacing import request_of
+from workbench.campaign.spec import Campaign
+from workbench.campaign.user_candidates import full_names, load_candidates
+from workbench.control import files as study_files
+from workbench.control.claims import HOLDS, Known, Verdict, judged
+from workbench.control.evaluate import StudyContext, study_key
+from workbench.control.figures import is_decided
+from workbench.control.plan import StudyPlan, plan_study, torque_limits
+from workbench.control.user_controller import load_controllers
+from workbench.errors import OutputError
+from workbench.staging import check_output
+from workbench.sweep import files, state
+from workbench.sweep.evaluate import Answer
+from workbench.sweep.identity import case_key
+from workbench.sweep.journal import NAME as JOURNAL
+from workbench.sweep.journal import Journal
+from workbench.sweep.progress import Meter, Show
+from workbench.sweep.record import GOOD, Record, lost, parse_line
+from workbench.sweep.run import SYNC_EVERY_S, SweepInterrupted, SweepOptions, cores
+from workbench.sweep.supervisor import Supervisor
+
+
+@dataclass(frozen=True)
+class StudyOutcome:
+    """A finished study: where it lies, what it says, whether every run could be computed."""
+
+    directory: Path
+    conclusion: Conclusion
+    summary: dict[str, Any]
+    manifest: dict[str, Any]
+
+
+def run_study(
+    campaign: Campaign,
+    file: Path,
+    directory: Path,
+    *,
+    model: Path | None = None,
+    settings: Mapping[str, float] | None = None,
+    command: Sequence[str] = (),
+    show: Show | None = None,
+    report: Callable[[Path], object] | None = None,
+    options: SweepOptions | None = None,
+    candidates: Sequence[str | Path] = (),
+    controllers: Sequence[str | Path] = (),
+) -> StudyOutcome:
+    """Run a campaign with ``[control]``, or what is missing of it.
+
+    Parameters
+    ----------
+    campaign, file
+        From `load_campaign`, with ``[control]``.
+    directory
+        Run directory; finished runs in it are taken over where all that determines them is the same.
+    model, settings, command, show, report, options, candidates
+        As for `run_sweep`.
+    controllers
+        Python files with controllers of the user's own.
+
+    Raises
+    ------
+    WorkbenchError
+        Bad input, results of other versions, a full disk: one line.
+    SweepInterrupted
+        Ctrl-C; finished runs are kept.
+    """
+    started, clock = datetime.now(UTC), time.perf_counter()
+    options = options or SweepOptions()
+    settings = dict(settings or {})
+    names = full_names(candidates)
+    own_files = full_names(controllers)
+    users, own = load_candidates(names), load_controllers(own_files)
+    plan = plan_study(campaign, file, model, settings, users, own)
+    common = study_key(plan, settings, users, own)
+    context = StudyContext(campaign, file.resolve(), plan.model.resolve(), settings, common, names, own_files)
+    request = {**request_of(model, settings, (), (), candidates), "controllers": sorted(map(str, controllers))}
+    with locked(directory):
+        try:
+            _prepare(directory, campaign.name, request, options)
+            study_files.write_journal(directory, _still_valid(directory, plan, common, options.retry_failed))
+            with Journal(directory / JOURNAL, len(plan.loops)) as journal:
+                computed = _compute(context, plan, journal, directory, options, show)
+                records = study_files.read_all(journal, len(plan.loops))
+            study_files.write_journal(directory, records)
+            study_files.write_tables(directory, plan.loops, records)
+            summary = summarise(plan, records)
+            manifest = _manifest(plan, summary, model, settings) | {
+                "command": shlex.join(command),
+                "request": request,
+                "started": started.isoformat(timespec="seconds"),
+                "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+                "seconds": round(time.perf_counter() - clock, 3),
+                "computed": computed,
+                "engines": ["mujoco"],
+                "budget": plan.spec.second_route == "all",
+            }
+            files.write_json(directory / study_files.CONTROL, summary)
+            files.write_json(directory / store.MANIFEST, manifest)
+            (directory / files.PROGRESS).unlink(missing_ok=True)
+            if report:
+                report(directory)
+        except OSError as error:
+            raise OutputError(
+                f"{directory}: cannot be written: {error.strerror or error}; finished runs are kept",
+                path=str(directory),
+            ) from error
+    return StudyOutcome(directory, conclusion_of(summary), summary, manifest)
+
+
+def _prepare(directory: Path, name: str, request: Mapping[str, Any], options: SweepOptions) -> None:
+    if (directory / store.MANIFEST).exists() and not (directory / study_files.CONTROL).exists():
+        raise OutputError(
+            f"{directory}: holds a run of another kind; --out names another directory", path=str(directory)
+        )
+    check_output(directory, study_files.RUN)
+    old = files.read_json(directory / files.STATE) or {}
+    before = old.get("campaign")
+    if before not in (None, name) and not (options.fresh or options.replace):
+        raise OutputError(
+            f'{directory}: holds runs of campaign "{before}"; --replace puts this one in its place, --out names another'
+            " directory",
+            path=str(directory),
+        )
+    if options.fresh or (options.replace and before not in (None, name)):
+        study_files.clear(directory)
+    else:
+        state.refuse_other_versions(directory)
+    state.begin(directory, {"campaign": name, "request": dict(request)})
+    (directory / store.MANIFEST).unlink(missing_ok=True)
+
+
+def _still_valid(directory: Path, plan: StudyPlan, common: str, retry_failed: bool) -> list[Record]:
+    """Finished runs of which all that determines them is the same, wherever in the study they now stand."""
+    path = directory / JOURNAL
+    if not path.exists():
+        return []
+    known = {}
+    with path.open("rb") as stream:
+        for line in stream:
+            record = parse_line(line)
+            if record is not None and not (retry_failed and record.status not in GOOD):
+                known[record.key] = record
+    keys = enumerate(case_key(common, vars(loop)) for loop in plan.loops)
+    return [replace(known[key], index=index) for index, key in keys if key in known]
+
+
+def _compute(
+    context: StudyContext, plan: StudyPlan, journal: Journal, directory: Path, options: SweepOptions, show: Show | None
+) -> int:
+    """Compute what the journal does not hold; return how many runs that was."""
+    counts, total, spec = journal.counts(), len(plan.loops), plan.spec
+    before = sum(counts.values())
+    meter = Meter(directory, before, total, counts, show)
+    if before == total:
+        return 0
+    pool = Supervisor(
+        max(1, min(options.jobs or cores(), total - before)),
+        context.setup,
+        spec.time_limit,
+        spec.memory_limit,
+        spec.retries,
+    )
+    synced = time.monotonic()
+    try:
+        for index, found in pool.run((index, (index, plan.loops[index])) for index in journal.missing()):
+            key = case_key(context.common, vars(plan.loops[index]))
+            record = found.record if isinstance(found, Answer) else lost(index, key, found.status, found.reason)
+            journal.append(record)
+            meter.count(record.status)
+            if time.monotonic() - synced > SYNC_EVERY_S:
+                journal.sync()
+                synced = time.monotonic()
+    except KeyboardInterrupt:
+        done = sum(journal.counts().values())
+        journal.sync()
+        raise SweepInterrupted(
+            f"{done} of {total} runs are finished and kept in {directory}; the same command goes on with the rest"
+        ) from None
+    finally:
+        pool.close()
+    meter.tell(force=True)
+    return total - before
+
+
+def known_runs(plan: StudyPlan, records: Sequence[Record]) -> list[Known]:
+    """What the claims are judged by: finished runs, those that are unstable without errors."""
+    found = []
+    for loop, record in zip(plan.loops, records, strict=True):
+        if record.status not in GOOD:
+            continue
+        row = next((row for row in record.rows if row["joint"] == "platform"), {})
+        errors = {r: row[r] for r in ("rms", "rms_halved", "rms_second") if row.get(r) is not None}
+        found.append(Known(loop, errors))
+    return found
+
+
+def summarise(plan: StudyPlan, records: Sequence[Record]) -> dict[str, Any]:
+    """What stands in ``control.json``: counts, how well errors are known, claims with their verdicts."""
+    runs = known_runs(plan, records)
+    verdicts = judged(plan.spec, runs)
+    unstable = [record for record in records if record.status in GOOD and not record.rows]
+    undecided = [run for run in runs if run.errors and not _is_known(run, plan.spec.second_route == "all")]
+    failed = [record for record in records if record.status not in GOOD]
+    return {
+        "format": 1,
+        "runs": len(plan.loops),
+        "tracked": len(runs) - len(unstable),
+        "unstable": len(unstable),
+        "undecided": len(undecided),
+        "failed": len(failed),
+        "reasons": sorted({record.reason for record in failed})[:10],
+        "first_unstable": [{"run": r.index, "reason": r.reason} for r in unstable[:10]],
+        "wanted_m": plan.spec.wanted,
+        "enough": plan.spec.enough,
+        "claims": [verdict.facts() for verdict in verdicts],
+    }
+
+
+def uncertainty_of(errors: Mapping[str, float]) -> float:
+    """How well the platform's error of a run is known, m: the largest difference between routes and steps."""
+    others = [abs(errors[name] - errors["rms"]) for name in ("rms_halved", "rms_second") if name in errors]
+    return max(others, default=float("nan"))
+
+
+def _is_known(run: Known, both: bool) -> bool:
+    if both and "rms_second" not in run.errors:
+        return False
+    return is_decided(run.errors["rms"], uncertainty_of(run.errors))
+
+
+def conclusion_of(summary: Mapping[str, Any]) -> Conclusion:
+    """The verdict on a study: whether every run could be computed; what it found stands beside it."""
+    runs = f"{summary['tracked']} of {summary['runs']} runs tracked their motion, {summary['unstable']} unstable"
+    known = f", {summary['undecided']} undecided" if summary["undecided"] else ""
+    if summary["failed"]:
+        status = FAILED if summary["failed"] == summary["runs"] else INCOMPLETE
+        return Conclusion(status, f"{runs}{known}; {summary['failed']} could not be computed: {summary['reasons'][0]}")
+    claims: Sequence[Mapping[str, Any]] = summary["claims"]
+    said = f"; {sum(c['verdict'] == HOLDS for c in claims)} of {len(claims)} claims hold" if claims else ""
+    return Conclusion(PASSED, f"{runs}{known}{said}")
+
+
+def _manifest(
+    plan: StudyPlan, summary: Mapping[str, Any], model: Path | None, settings: Mapping[str, float]
+) -> dict[str, Any]:
+    campaign = plan.campaign
+    first = campaign.case[0]
+    variant = Variant(first.name, plan.robot, first.parameters)
+    changes = changes_of(campaign, plan.file, model, settings, (), [variant])
+    found = conclusion_of(summary)
+    return describe(campaign, plan.file, plan.model, plan.robot, first.name, changes) | {
+        "format": store.FORMAT,
+        "status": found.status,
+        "verdict": found.sentence,
+        "candidates": {
+            name: {
+                "mass_model": plan.robot.candidates[name].mass_model,
+                "description": plan.robot.candidates[name].description,
+                "source": plan.robot.candidates[name].source,
+            }
+            for name in plan.spec.models
+            if name in plan.robot.candidates
+        },
+        "actuators": {},
+        "claims": [],
+        "figures": [],
+        "cases": {},
+        "control": {"runs": len(plan.loops), "limits": torque_limits(campaign, plan.robot) if plan.spec.limits else {}},
+    }
+
+
+__all__ = ["StudyOutcome", "Verdict", "run_study"]

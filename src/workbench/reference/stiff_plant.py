@@ -1,0 +1,79 @@
+"""The second route: MuJoCo's own forward dynamics with near-rigid loops, moved on in time by its own integrator.
+
+Shares nothing with `workbench.reference.forward` but the model's numbers and the state that it begins at. Of first
+order in the step, so figures are taken at a step and at its half.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from workbench.arrays import FloatArray
+from workbench.reference.forward_kernels import DONE, LOST
+from workbench.reference.mujoco_reference import MujocoReference
+from workbench.reference.replay import LOOP_SOLIMP, near_rigid
+
+
+class StiffPlant:
+    """The same interface as `workbench.reference.forward.Plant`, by MuJoCo; run it inside of `replay.quiet`.
+
+    Parameters
+    ----------
+    reference
+        The robot.
+    external_force
+        Newtons, base frame, constant, on the platform's site ``(3,)``.
+    """
+
+    def __init__(self, reference: MujocoReference, external_force: FloatArray | None = None) -> None:
+        self.reference = reference
+        self._force = np.zeros(3) if external_force is None else np.array(external_force, dtype=np.float64)
+        structure = reference.structure
+        pull, name = None, reference.compiled().site(structure.platform_site).name
+        if self._force.any():
+            pull = name, reference.base_rotation @ self._force
+        self._model = near_rigid(reference.spec(), 1e-3, pull)
+        # what pulls brings a site of its own, so numbers are others
+        self._site = self._model.site(name).id if name else structure.platform_site
+        self._data = mujoco.MjData(self._model)
+        self._actuated, self._actuated_qpos = structure.actuated, structure.actuated_qpos
+
+    @property
+    def q(self) -> FloatArray:
+        """Actuated coordinates ``(na,)`` now; a copy."""
+        return np.asarray(self._data.qpos, dtype=np.float64)[self._actuated_qpos]
+
+    @property
+    def qd(self) -> FloatArray:
+        """Their rates now; a copy."""
+        return np.asarray(self._data.qvel, dtype=np.float64)[self._actuated]
+
+    @property
+    def platform(self) -> FloatArray:
+        """The platform's site ``(3,)``, m, base frame."""
+        mujoco.mj_kinematics(self._model, self._data)
+        site = np.asarray(self._data.site_xpos[self._site])
+        found: FloatArray = (site - self.reference.base_position) @ self.reference.base_rotation
+        return found
+
+    def begin(self, q: FloatArray, qd: FloatArray) -> None:
+        """Stand at a state ``(na,)``."""
+        start = self.reference.inverse_dynamics(q[None], qd[None], np.zeros((1, len(q))), "distributed", self._force)
+        mujoco.mj_resetData(self._model, self._data)
+        self._data.qpos[:], self._data.qvel[:] = start.qpos[0], start.qvel[0]
+
+    def stiffen(self, step: float) -> None:
+        """Make loops and dry friction as stiff as steps of at most *step* seconds allow."""
+        model = self._model
+        model.eq_solref[:] = [2.0 * step, 1.0]
+        model.eq_solimp[:] = LOOP_SOLIMP
+        if model.nv:
+            model.dof_solref[:] = [2.0 * step, 1.0]
+
+    def move(self, tau: FloatArray, duration: float, steps: int) -> int:
+        """Move on by *duration* seconds under constant torques ``(na,)``: `DONE`, or `LOST` where numbers are."""
+        self._model.opt.timestep = duration / steps
+        self._data.qfrc_applied[self._actuated] = tau
+        mujoco.mj_step(self._model, self._data, nstep=steps)
+        return DONE if np.isfinite(self._data.qvel).all() and np.abs(self._data.qvel).max() < mujoco.mjMAXVAL else LOST

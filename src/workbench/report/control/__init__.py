@@ -1,0 +1,1 @@
+"""The report of a study of control: sections over its stored results."""

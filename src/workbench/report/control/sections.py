@@ -1,0 +1,314 @@
+"""The sections of a study's report: what the claims came to, the curves behind them, what is unstable."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from workbench.report.control.curves import RATE, SPEED, curve, is_number
+from workbench.report.control.load import StudyRun
+from workbench.report.plot import Plot
+from workbench.report.section import Section, plain_section
+from workbench.report.sections import NO_REAL_ROBOT, parameters_section, reproduce_section
+from workbench.report.tables import HOLDS, REFUTED, UNDECIDED, Cell, Status, Table, columns
+
+LOOKS = {"holds": HOLDS, "does not hold": REFUTED}
+MOST_ROWS = 400
+"""Rows of the table of all errors; the rest stands in errors.parquet."""
+
+DECIDED = 0.1
+"""An error that is not known to this part of itself is called undecided."""
+
+
+def study_sections(run: StudyRun) -> list[Section]:
+    """Return all sections of a study's report."""
+    sections = [
+        _answer_section(run),
+        _over_section(run, RATE, "Tracking error over the control rate"),
+        _over_section(run, SPEED, "Tracking error over the speed"),
+        _gap_section(run),
+        _unstable_section(run),
+        _errors_section(run),
+        _setting_section(run),
+        parameters_section(run.manifest),
+        reproduce_section(run.manifest),
+        _limits_section(run),
+    ]
+    return [section for section in sections if section is not None]
+
+
+def _status(verdict: str) -> Status:
+    return LOOKS.get(verdict, UNDECIDED)
+
+
+def _answer_section(run: StudyRun) -> Section:
+    study = run.study
+    counts = (
+        f"{study.tracked} of {study.runs} runs tracked their motion, {study.unstable} ended unstable, {study.undecided}"
+        f" are not known to a tenth of their error, {study.failed} could not be computed."
+    )
+    tables = []
+    if study.claims:
+        rows = []
+        for claim in study.claims:
+            differing = [name for name, verdict in claim.varied.items() if verdict != claim.verdict]
+            robust = "the same throughout" if not differing else "another verdict with: " + ", ".join(differing)
+            rows.append(
+                (
+                    Cell(claim.text), Cell(claim.source), Cell(status=_status(claim.verdict)),
+                    Cell(claim.sentence + (f" ({claim.note})" if claim.note else "")), Cell(robust),
+                )
+            )  # fmt: skip
+        tables.append(
+            Table(
+                "control-claims",
+                "Sentences about models in control, judged by tracking errors.",
+                columns(("Claim", "Source", "Verdict", "What decides it", "Step, integrator and gains varied")),
+                tuple(rows),
+                f"A model is enough at a point where its platform error (rms) is at most {100 * study.enough:g} % above"
+                f" the other model's, or below {1e3 * study.wanted_m:g} mm. “Known to” is the largest change of that"
+                " share with half the plant's step, or by MuJoCo's own integrator and loops.",
+            )
+        )
+        names = list(dict.fromkeys(name for claim in study.claims for name in claim.varied))
+        tables.append(
+            Table(
+                "control-varied",
+                "The same verdicts with step, integrator and gains varied.",
+                columns(("Claim", *names)),
+                tuple(
+                    (Cell(claim.id), *(Cell(status=_status(claim.varied.get(name, ""))) for name in names))
+                    for claim in study.claims
+                ),
+                "Each column judges all claims again: by runs at half the step, by MuJoCo's route, by one bandwidth.",
+            )
+        )
+    return plain_section("answer", "Is the model enough for control", [run.manifest.verdict, counts], tables)
+
+
+def _cases(run: StudyRun) -> list[str]:
+    return list(dict.fromkeys(row["case"] for row in run.runs))
+
+
+def _bandwidths(run: StudyRun) -> list[float]:
+    return sorted({row["bandwidth"] for row in run.runs})
+
+
+def _over_section(run: StudyRun, over: str, title: str) -> Section | None:
+    other = SPEED if over == RATE else RATE
+    fixed = sorted({row[other] for row in run.runs if row["rate_asked"] != "printed cost"})
+    if not fixed:
+        return None
+    middle = min(fixed, key=lambda value: abs(math.log(value))) if over == RATE else fixed[len(fixed) // 2]
+    width = _bandwidths(run)[len(_bandwidths(run)) // 2]
+    plots = [plot for case in _cases(run) if (plot := curve(run, over, case, middle, width)) is not None]
+    if not plots:
+        return None
+    return _with_figures(f"over-{over}", title, plots, "One line for each controller with its model; logarithmic axes.")
+
+
+def _with_figures(key: str, title: str, plots: list[Plot], note: str) -> Section:
+    context = {"paragraphs": [], "tables": [], "figures": plots, "note": note}
+    return Section(key, title, "sweep", context, tuple(plots))
+
+
+def _gap_section(run: StudyRun) -> Section | None:
+    """The error that a model adds, as a share of what remains anyway, at every place that two models share."""
+    by_place: dict[tuple[Any, ...], dict[str, dict[str, Any]]] = {}
+    for row in run.runs:
+        error = run.platform(row)
+        if error is not None and row["model"] != "none" and row["rate_asked"] != "printed cost":
+            place = row["case"], row["controller"], row["speed"], row["rate"], row["bandwidth"]
+            by_place.setdefault(place, {})[row["model"]] = error
+    models = list(dict.fromkeys(claim for claim in _models(run)))
+    if len(models) < 2:
+        return None
+    least = _best_model(by_place, models)
+    rows = []
+    for place, errors in by_place.items():
+        if least not in errors:
+            continue
+        for model, error in errors.items():
+            if model == least:
+                continue
+            share = error["rms"] / errors[least]["rms"] - 1.0
+            routes = ("rms_halved", "rms_second")
+            other = [
+                error[r] / errors[least][r] - 1.0 for r in routes if is_number(error[r]) and is_number(errors[least][r])
+            ]
+            known = max((abs(value - share) for value in other), default=math.nan)
+            rows.append((place, model, share, known, error["rms"], errors[least]["rms"]))
+    if not rows:
+        return None
+    table = Table(
+        "control-gap",
+        f"What a model adds to the error that remains with {least}, all else equal (rate, delay, encoder, gains).",
+        columns(
+            ("Case", "Controller", "Model", "Speed", "Rate [Hz]", "Bandwidth [Hz]", "Adds", "Known to", "Error [mm]",
+             f"With {least} [mm]"),
+            numeric=("Speed", "Rate [Hz]", "Bandwidth [Hz]", "Adds", "Known to", "Error [mm]", f"With {least} [mm]"),
+        ),
+        tuple(
+            (
+                Cell(place[0]), Cell(place[1]), Cell(model), Cell(f"{place[2]:g}", place[2]),
+                Cell(f"{place[3]:g}", place[3]), Cell(f"{place[4]:g}", place[4]),
+                Cell(f"{100 * share:+.3g} %", share, emphasis=share > run.study.enough),
+                Cell("–" if math.isnan(known) else f"{100 * known:.2g} %", known),
+                Cell(f"{1e3 * error:.3g}", error), Cell(f"{1e3 * base:.3g}", base),
+            )
+            for place, model, share, known, error, base in rows[:MOST_ROWS]
+        ),
+        f"Shares above {100 * run.study.enough:g} % stand out. All {len(rows)} of them follow from errors.parquet.",
+    )  # fmt: skip
+    return plain_section("gap", "What the model adds", _where_it_matters(run, rows), [table])
+
+
+def _models(run: StudyRun) -> list[str]:
+    return [row["model"] for row in run.runs if row["model"] != "none"]
+
+
+def _best_model(by_place: dict[tuple[Any, ...], dict[str, dict[str, Any]]], models: list[str]) -> str:
+    """The model with the least errors, summed as logarithms over the places that all share."""
+    shared = [errors for errors in by_place.values() if all(model in errors for model in models)]
+    return min(models, key=lambda model: sum(math.log(max(errors[model]["rms"], 1e-12)) for errors in shared))
+
+
+def _where_it_matters(run: StudyRun, rows: list[tuple[Any, ...]]) -> list[str]:
+    """Where a model begins to matter: the slowest speed at which it adds more than is called enough."""
+    said = []
+    for case, controller, model in dict.fromkeys((row[0][0], row[0][1], row[1]) for row in rows):
+        mine = [row for row in rows if (row[0][0], row[0][1], row[1]) == (case, controller, model)]
+        over = [row for row in mine if row[2] > run.study.enough and row[4] > run.study.wanted_m]
+        if over:
+            first = min(over, key=lambda row: (row[0][2], row[0][3]))
+            said.append(
+                f"{case}, {controller}: {model} begins to matter at speed {first[0][2]:g}, {first[0][3]:g} Hz and"
+                f" {first[0][4]:g} Hz bandwidth, where it adds {100 * first[2]:.3g} %; it matters at {len(over)} of"
+                f" {len(mine)} places."
+            )
+        else:
+            said.append(f"{case}, {controller}: {model} does not matter at any of {len(mine)} places.")
+    return said
+
+
+def _unstable_section(run: StudyRun) -> Section | None:
+    """Which loops ran away, and the lowest rate at which each controller still tracks."""
+    unstable = [row for row in run.runs if row["reason"] and run.platform(row) is None]
+    if not unstable:
+        return None
+    rows = []
+    for key in dict.fromkeys((r["case"], run.place(r).name, r["speed"], r["bandwidth"]) for r in run.runs):
+        mine = [r for r in run.runs if (r["case"], run.place(r).name, r["speed"], r["bandwidth"]) == key]
+        lost = [r for r in mine if run.platform(r) is None]
+        if not lost:
+            continue
+        kept = [r["rate"] for r in mine if run.platform(r) is not None]
+        lowest = f"{min(kept):g}" if kept else "none"
+        rows.append(
+            (
+                Cell(key[0]), Cell(key[1]), Cell(f"{key[2]:g}", key[2]), Cell(f"{key[3]:g}", key[3]),
+                Cell(lowest, min(kept, default=math.nan)), Cell(lost[0]["reason"]),
+            )
+        )  # fmt: skip
+    table = Table(
+        "control-unstable",
+        "Loops that do not track: unstable, or led where the loops of the mechanism cannot be closed.",
+        columns(
+            ("Case", "Controller", "Speed", "Bandwidth [Hz]", "Lowest rate that tracks [Hz]", "First that does not"),
+            numeric=("Speed", "Bandwidth [Hz]", "Lowest rate that tracks [Hz]"),
+        ),
+        tuple(rows[:MOST_ROWS]),
+        "A loop is called unstable when a joint is off by more than its stroke (at least 0.05 m or rad).",
+    )
+    return plain_section("unstable", "Stability", [f"{len(unstable)} of {len(run.runs)} runs do not track."], [table])
+
+
+def _errors_section(run: StudyRun) -> Section:
+    """Every run's error with the difference that routes and steps make to it."""
+    rows = []
+    for row in run.runs:
+        error = run.platform(row)
+        if error is None:
+            continue
+        step = abs(error["rms_halved"] - error["rms"]) if is_number(error["rms_halved"]) else math.nan
+        route = abs(error["rms_second"] - error["rms"]) if is_number(error["rms_second"]) else math.nan
+        known = max((value for value in (step, route) if not math.isnan(value)), default=math.nan)
+        decided = known <= DECIDED * error["rms"]
+        effort = [run.errors[row["index"]][joint]["effort"] for joint in run.manifest.joints]
+        hit = max(run.errors[row["index"]][joint]["saturated"] for joint in run.manifest.joints)
+        rows.append(
+            (
+                Cell(row["case"]), Cell(run.place(row).name), Cell(f"{row['speed']:g}", row["speed"]),
+                Cell(f"{row['rate']:.6g}", row["rate"]), Cell(f"{row['bandwidth']:g}", row["bandwidth"]),
+                Cell(f"{1e3 * error['rms']:.3g}", error["rms"]), Cell(f"{1e3 * error['peak']:.3g}", error["peak"]),
+                Cell(_micro(step), step), Cell(_micro(route), route),
+                Cell("") if decided else Cell(status=UNDECIDED),
+                Cell(", ".join(f"{value:.3g}" for value in effort)), Cell(f"{100 * hit:.2g} %" if hit else "–", hit),
+            )
+        )  # fmt: skip
+    units = ", ".join(run.manifest.force_units)
+    names = (
+        "Case", "Controller", "Speed", "Rate [Hz]", "Bandwidth [Hz]", "rms [mm]", "Peak [mm]", "Half step [µm]",
+        "Second route [µm]", "Known", f"Effort, rms [{units}]", "Saturated",
+    )  # fmt: skip
+    table = Table(
+        "control-errors",
+        "Tracking error of the platform, what half the step and the second route change of it, and torque effort.",
+        columns(names, numeric=[name for name in names if name not in ("Case", "Controller", "Known", names[-2])]),
+        tuple(rows[:MOST_ROWS]),
+        f"{min(len(rows), MOST_ROWS)} of {len(rows)} runs; all of them, with every joint, stand in errors.parquet. An"
+        " error is undecided where it is not known to a tenth of itself.",
+    )  # fmt: skip
+    return Section("errors", "All tracking errors", "sweep",
+                   {"paragraphs": [], "tables": [table], "figures": (), "note": ""}, is_open=False)  # fmt: skip
+
+
+def _micro(value: float) -> str:
+    return "–" if math.isnan(value) else f"{1e6 * value:.2g}"
+
+
+def _setting_section(run: StudyRun) -> Section:
+    spec = run.manifest.spec.get("control") or {}
+    shown = {
+        "controllers": "Controllers", "models": "Models", "rates": "Rates [Hz]", "highest_rate": "Highest rate [Hz]",
+        "bandwidths": "Bandwidths [Hz]", "damping": "Damping ratio", "speeds": "Speeds", "delay": "Delay",
+        "resolution": "Encoder resolution [m, rad]", "noise": "Noise, standard deviation [m, rad]",
+        "rate_from": "Rates from", "seed": "Seed", "limits": "Torque limits", "plant": "Parameters of the plant alone",
+        "force_known": "The models know the external force", "printed_cost": "Printed cost [µs]",
+        "step": "Plant's step [s]", "duration": "Tracked, at most [s]",
+    }  # fmt: skip
+    rows = tuple((Cell(text), Cell(_plain(spec.get(key)))) for key, text in shown.items())
+    table = Table(
+        "control-setting",
+        "How the loops are sampled and tuned; the same for all models.",
+        columns(("Setting", "Value")),
+        rows,
+        "Gains: kp = omega^2 and kd = 2 zeta omega, times the diagonal of the reference's mass matrix at home where the"
+        " controller has no model of its own for it.",
+    )
+    return plain_section("setting", "Setting", [], [table])
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(_plain(one) for one in value)
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_plain(one)}" for key, one in value.items() if one is not None) or "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "–" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _limits_section(run: StudyRun) -> Section:
+    points = [
+        NO_REAL_ROBOT,
+        "Bars and joints are rigid, actuators give the torque that is asked for at once, encoders sit at the joints: a "
+        "real robot bends, and its drives have a bandwidth of their own.",
+        "Errors are taken at the ticks. What happens between two ticks of a slow loop is not in them.",
+        "Each run begins on its motion, at its rates; what a controller does with a first jump is not part of it.",
+        "What is stable here may grow slowly: a loop is called unstable only when a joint has left its stroke within "
+        "the time that is tracked.",
+    ]
+    if run.study.undecided:
+        points.append(f"{run.study.undecided} errors are not known to a tenth of themselves and decide nothing.")
+    return Section("limits", "Limits and caveats", "limits", {"points": points})
