@@ -100,7 +100,8 @@ def _over_section(run: StudyRun, over: str, title: str) -> Section | None:
     if not fixed:
         return None
     middle = min(fixed, key=lambda value: abs(math.log(value))) if over == RATE else fixed[len(fixed) // 2]
-    width = _bandwidths(run)[len(_bandwidths(run)) // 2]
+    widths = _bandwidths(run)
+    width = widths[(len(widths) - 1) // 2]
     plots = [plot for case in _cases(run) if (plot := curve(run, over, case, middle, width)) is not None]
     if not plots:
         return None
