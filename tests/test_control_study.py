@@ -234,6 +234,11 @@ def test_a_model_is_enough_where_that_is_known(lumped: tuple[float, ...], verdic
 def test_an_error_that_nobody_minds_is_enough() -> None:
     errors = {(1.0, "500", "lumped"): (5e-5,) * 3, (1.0, "500", "distributed"): (1e-6,) * 3}
     assert verdict_of("enough", errors) == HOLDS
+    # but only where two routes say so, and both below what matters
+    errors[1.0, "500", "lumped"] = (9.9e-5, 9.9e-5, 1.2e-4)
+    assert verdict_of("enough", errors) != HOLDS
+    errors[1.0, "500", "lumped"] = (5e-5, 5e-5)
+    assert verdict_of("enough", errors) == UNDECIDED
 
 
 def test_claims_about_speed_and_rate() -> None:
