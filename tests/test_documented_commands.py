@@ -30,6 +30,7 @@ ELSEWHERE = {
     r"make (setup|test|test-slow|test-browser|run|docs)( |$)": "what the continuous integration does",
     r"make (mutants|bench|reports|format)( |$)": "by hand: hours, or they change files; test_mutants.py plans mutants",
     r"python benchmarks/": "by hand: they measure this machine",
+    r"workbench run --robots all": "make library does, and keeps what it finds; test_library.py runs one robot",
     r"pip install ": "test_distribution.py installs the wheel and the source distribution",
     r"workbench run \S+ --scheduler tcp://head": "test_sweep_run.py, on a cluster of this machine",
     r"workbench run campaigns/(almeida_2010_control|control_4rprp)": "minutes; test_control_study.py has small ones",
@@ -136,6 +137,8 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("models", "campaigns", "examples"):
         shutil.copytree(REPOSITORY / name, place / name, ignore=shutil.ignore_patterns("reports", "__pycache__"))
     shutil.copytree(place / "examples" / "fivebar", place / "fivebar")
+    shown = (REPOSITORY / "docs" / "robots.md").read_text(encoding="utf-8").split("```toml robot.toml\n")[1]
+    (place / "fivebar" / "robot.toml").write_text(shown.split("```", maxsplit=1)[0], encoding="utf-8")
     sweep = place / "campaigns" / "design_sweep.toml"
     text = sweep.read_text(encoding="utf-8")
     assert text.count("samples = 10000") == 1
@@ -214,7 +217,8 @@ def test_the_first_five_minutes_go_as_they_are_told(tmp_path: Path) -> None:
     assert "PASSED" in said[0]
     assert "5.90 %" in said[0]
     assert "payload" in said[1]
-    assert "exit code 1" in said[3]
+    assert "NOTHING JUDGED" in said[3]
+    assert "exit code 4" in said[3]
     assert (place / "reports/almeida_2010/report.html").exists()
 
 

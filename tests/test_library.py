@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
+import subprocess
+import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+import workbench as wb
 from workbench.cli import app
 from workbench.errors import OutputError, SpecError
 from workbench.library.card import read_card
@@ -134,3 +139,40 @@ def test_a_broken_formula_of_the_library_is_exit_code_1(tmp_path: Path, monkeypa
     assert "0 of 1 robots" in done.output
     (tmp_path / "examples" / "fourbar" / "fourbar.toml").write_text("format = 2\n")
     assert CliRunner().invoke(app, arguments).exit_code == 2
+
+
+@pytest.mark.slow
+def test_a_wheel_carries_the_library(repository: Path, tmp_path: Path) -> None:
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", tmp_path], cwd=repository, check=True
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "site")
+    code = "from workbench.__main__ import main; main()"
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site"), "PYTHONDONTWRITEBYTECODE": "1"}
+    for arguments, found in (
+        (["robots", "--json"], str(tmp_path / "site" / "workbench" / "data" / "examples" / "stewart" / "stewart.png")),
+        (["run", "--robots", "fourbar", "--quick", "--no-pictures"], "1 of 1 robots hold every bound"),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", code, *arguments], cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        assert found in done.stdout
+
+
+def test_positions_of_a_series_are_named_as_positions() -> None:
+    """x1 to x3 are x, y, z whatever the task coordinates are: a planar robot's z is not its ry."""
+    for name in ("rrr", "rps", "stewart", "delta"):
+        assert wb.load_robot(entry(name).folder).position_axes == ("x", "y", "z")
+    assert wb.load_robot("asym_2rss_ppap").position_axes == ("x1", "x2", "x3")
+
+
+def test_a_robot_with_six_freedoms_has_a_report(tmp_path: Path) -> None:
+    arguments = ["run", "--robots", "stewart", "--quick", "--no-pictures", "--out", str(tmp_path)]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    manifest = json.loads((tmp_path / "stewart" / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["platform_axes"] == ["x", "y", "z"]
+    assert (tmp_path / "stewart" / "report.html").is_file()

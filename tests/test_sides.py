@@ -58,6 +58,50 @@ def blind(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pinocchio_loops.PinocchioLoops, "_same_side", lambda *_: True)
 
 
+@pytest.mark.parametrize("sizes", [(1,), (2,), (5,), (1, 1), (3, 2), (2, 1, 3)])
+def test_a_side_is_the_signs_of_the_determinants_of_blocks(sizes: tuple[int, ...]) -> None:
+    """Against NumPy, block by block: every sign of a pivot and every exchange of rows counts."""
+    random = np.random.default_rng(sum(sizes) + len(sizes))
+    whole = sum(sizes)
+    ends = np.cumsum((0, *sizes))
+    pattern = np.zeros((whole, whole), dtype=np.bool_)
+    for first, end in itertools.pairwise(ends):
+        pattern[first:end, :end] = True  # a block sees those before it, as loops on one crank do
+    own = np.repeat(np.arange(len(sizes)), sizes)
+    columns = np.arange(whole)
+    table = sides.side_table(np.where(pattern, random.normal(size=pattern.shape), 0.0), pattern, own, columns)
+    assert sorted(np.diff(table.starts)) == sorted(sizes)
+    seen = set()
+    for _ in range(40):
+        one = np.where(pattern, random.normal(size=pattern.shape), 0.0)
+        signs = [
+            np.linalg.det(one[np.ix_(table.rows[first:end], table.columns[first:end])]) < 0.0
+            for first, end in itertools.pairwise(table.starts)
+        ]
+        side = sides.side_at(one, columns, table)
+        assert side == sum(1 << block for block, negative in enumerate(signs) if negative)
+        seen.add(side)
+    assert len(seen) == 2 ** len(sizes)
+    flat = one.copy()
+    flat[-1] = 0.0
+    assert sides.side_at(flat, columns, table) == sides.UNKNOWN
+
+
+@pytest.mark.parametrize(("rows", "size"), [(3, 1), (5, 3), (6, 4)])
+def test_redundant_rows_are_turned_over_where_least_squares_says_so(rows: int, size: int) -> None:
+    random = np.random.default_rng(rows)
+    everywhere = np.ones((rows, size), dtype=np.bool_)
+    group = np.zeros(rows, dtype=np.int64)
+    table = sides.side_table(random.normal(size=(rows, size)), everywhere, group, np.arange(size))
+    before, after = random.normal(size=(2, 40, rows, size))
+    after[-1] = 0.0  # no side at all is not the same one
+    same = np.zeros(40, dtype=np.bool_)
+    sides.same_side(before, after, table, np.empty((size, size)), same)
+    expected = [np.linalg.det(np.linalg.lstsq(a, b)[0]) > 0.0 for a, b in zip(before, after, strict=True)]
+    assert same.tolist() == expected
+    assert {True, False} == set(expected[:-1])
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("spoiled", [False, True])
 def test_random_four_bars_whose_branches_all_but_meet(
@@ -274,47 +318,3 @@ def test_neighbours_on_two_sides_are_no_motion(tmp_path: Path, monkeypatch: pyte
         monkeypatch.setattr(type(closer), "_on_side", lambda self, here, rows, *_: np.ones(len(rows), dtype=np.bool_))
     assert closer._linked(jumped, q).tolist() == [spoiled]
     assert spoiled or closer._linked(same, q).tolist() == [True]
-
-
-@pytest.mark.parametrize("sizes", [(1,), (2,), (5,), (1, 1), (3, 2), (2, 1, 3)])
-def test_a_side_is_the_signs_of_the_determinants_of_blocks(sizes: tuple[int, ...]) -> None:
-    """Against NumPy, block by block: every sign of a pivot and every exchange of rows counts."""
-    random = np.random.default_rng(sum(sizes) + len(sizes))
-    whole = sum(sizes)
-    ends = np.cumsum((0, *sizes))
-    pattern = np.zeros((whole, whole), dtype=np.bool_)
-    for first, end in itertools.pairwise(ends):
-        pattern[first:end, :end] = True  # a block sees those before it, as loops on one crank do
-    own = np.repeat(np.arange(len(sizes)), sizes)
-    columns = np.arange(whole)
-    table = sides.side_table(np.where(pattern, random.normal(size=pattern.shape), 0.0), pattern, own, columns)
-    assert sorted(np.diff(table.starts)) == sorted(sizes)
-    seen = set()
-    for _ in range(40):
-        one = np.where(pattern, random.normal(size=pattern.shape), 0.0)
-        signs = [
-            np.linalg.det(one[np.ix_(table.rows[first:end], table.columns[first:end])]) < 0.0
-            for first, end in itertools.pairwise(table.starts)
-        ]
-        side = sides.side_at(one, columns, table)
-        assert side == sum(1 << block for block, negative in enumerate(signs) if negative)
-        seen.add(side)
-    assert len(seen) == 2 ** len(sizes)
-    flat = one.copy()
-    flat[-1] = 0.0
-    assert sides.side_at(flat, columns, table) == sides.UNKNOWN
-
-
-@pytest.mark.parametrize(("rows", "size"), [(3, 1), (5, 3), (6, 4)])
-def test_redundant_rows_are_turned_over_where_least_squares_says_so(rows: int, size: int) -> None:
-    random = np.random.default_rng(rows)
-    everywhere = np.ones((rows, size), dtype=np.bool_)
-    group = np.zeros(rows, dtype=np.int64)
-    table = sides.side_table(random.normal(size=(rows, size)), everywhere, group, np.arange(size))
-    before, after = random.normal(size=(2, 40, rows, size))
-    after[-1] = 0.0  # no side at all is not the same one
-    same = np.zeros(40, dtype=np.bool_)
-    sides.same_side(before, after, table, np.empty((size, size)), same)
-    expected = [np.linalg.det(np.linalg.lstsq(a, b)[0]) > 0.0 for a, b in zip(before, after, strict=True)]
-    assert same.tolist() == expected
-    assert {True, False} == set(expected[:-1])

@@ -12,6 +12,13 @@ from sphinx.cmd.build import main as sphinx
 from website.links import findings
 from website.stage import stage
 
+LABELS = {
+    '<p class="caption" role="heading">': '<p class="caption" role="heading" aria-level="2">',
+    '<aside class="sidebar-drawer">': '<aside class="sidebar-drawer" aria-label="Pages">',
+    '<aside class="toc-drawer">': '<aside class="toc-drawer" aria-label="On this page">',
+}
+"""What the theme leaves out for screen readers."""
+
 REPOSITORY = Path(__file__).resolve().parents[1]
 
 
@@ -22,10 +29,19 @@ def build(repository: Path, out: Path) -> int:
     stage(repository, source, out / "extra")
     options = ["-q", "-W", "--keep-going", "-E", "-j", "auto", "-b", "html", "-c", str(repository / "website")]
     code = sphinx([*options, "-d", str(out / "doctrees"), str(source), str(html)])
+    for page in html.rglob("*.html") if not code else ():
+        if not page.is_relative_to(html / "reports"):
+            page.write_text(_labelled(page.read_text(encoding="utf-8")), encoding="utf-8")
     wrong = findings(html) if html.is_dir() else []
     for line in wrong:
         print(line, file=sys.stderr)
     return int(code) or len(wrong)
+
+
+def _labelled(text: str) -> str:
+    for found, put in LABELS.items():
+        text = text.replace(found, put)
+    return text
 
 
 def main() -> None:

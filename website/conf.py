@@ -25,8 +25,8 @@ html_show_sphinx = False
 html_copy_source = False
 html_last_updated_fmt = None
 html_theme_options = {"navigation_with_keys": True}
-pygments_style = "friendly"
-pygments_dark_style = "monokai"
+# A block without a language is no Python.
+highlight_language = "text"
 
 # Headings have GitHub's anchors, and ```math is an equation, as GitHub shows it.
 myst_heading_anchors = 4
@@ -37,6 +37,10 @@ myst_dmath_double_inline = True
 myst_dmath_allow_space = False
 myst_dmath_allow_digits = False
 
+# --from is an option, and C' a derivative.
+smartquotes = False
+# Single backticks of docstrings are names.
+default_role = "literal"
 autodoc_typehints = "description"
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"

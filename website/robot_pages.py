@@ -8,8 +8,10 @@ from pathlib import Path
 from website.pages_of import below
 
 ROBOT_FILE = "robot.toml"
+PAPER = "paper"
+"""The folder of the software paper, whose page stands elsewhere."""
 
-HEAD = """# Robots
+HEAD = """# Folders of robots
 
 A robot is a folder: an MJCF, a `robot.toml` ([every key](docs/robots.md)), formulas, a campaign. Each page derives its
 formula and says where its numbers come from.
@@ -20,11 +22,17 @@ formula and says where its numbers come from.
 
 
 def page(repository: Path) -> str:
-    """Give the page, a row per robot file, and the READMEs of all folders below it in the side bar."""
+    """Give the page: a row per robot file, other folders below, and all of their pages in the side bar."""
     rows = [_row(path, repository) for path in _robot_files(repository)]
-    readmes = [path.relative_to(repository).with_suffix("").as_posix() for path in below(repository, "README.md")]
-    tree = ("```{toctree}", ":maxdepth: 1", ":caption: Folders", "", *readmes, "```", "")
-    return HEAD + "\n".join(rows) + "\n\n" + "\n".join(tree)
+    readmes = [path for path in below(repository, "README.md") if path.parent.name != PAPER]
+    names = [path.relative_to(repository).with_suffix("").as_posix() for path in readmes]
+    tree = ("```{toctree}", ":hidden:", "", *names, "```", "")
+    others = [
+        f"- [{path.read_text(encoding='utf-8').partition(chr(10))[0].removeprefix('# ')}]({name}.md)"
+        for path, name in zip(readmes, names, strict=True)
+        if not path.with_name(ROBOT_FILE).exists()
+    ]
+    return HEAD + "\n".join(rows) + "\n\nFolders that hold no robot:\n\n" + "\n".join(others) + "\n\n" + "\n".join(tree)
 
 
 def _robot_files(repository: Path) -> list[Path]:
@@ -38,5 +46,6 @@ def _row(path: Path, repository: Path) -> str:
     derivation = f"docs/derivations/{name}.md"
     page_of = derivation if (repository / derivation).exists() else f"{folder}/README.md"
     link = f"[{name}]({page_of})" if (repository / page_of).exists() else name
-    platform = " ".join(spec.get("platform", {}).get("coordinates", ("x", "y", "z")))
+    free = ("x", "y", "z") if len(spec["actuated"]) >= 3 else ()  # those of a robot file that says nothing
+    platform = " ".join(spec["platform"].get("coordinates", free))
     return f"| {link} | {spec.get('title', '')} | {' '.join(spec['actuated'])} | {platform} |"

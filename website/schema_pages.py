@@ -39,22 +39,30 @@ them with examples.
 
 def campaign_page(repository: Path) -> str:
     """Give the page of the campaign file."""
-    return CAMPAIGN + "\n".join(_tables(Campaign, {}))
+    return CAMPAIGN + "\n".join(_tables(Campaign))
 
 
 def robot_page(repository: Path) -> str:
     """Give the page of the robot file."""
-    return ROBOT + "\n".join(_tables(RobotSpec, {}))
+    return ROBOT + "\n".join(_tables(RobotSpec))
 
 
-def _tables(root: type[BaseModel], seen: dict[type[BaseModel], str]) -> Iterator[str]:
-    """The tables of a document, each once, in the order in which they are named."""
+def tables(root: type[BaseModel]) -> dict[type[BaseModel], str]:
+    """Schemas of a document's tables with their headings, each once, in the order in which they are named."""
+    found: dict[type[BaseModel], str] = {}
     waiting: list[tuple[str, type[BaseModel]]] = [("", root)]
     while waiting:
         heading, model = waiting.pop(0)
-        if model in seen:
-            continue
-        seen[model] = heading
+        if model not in found:
+            found[model] = heading
+            for name, field in model.model_fields.items():
+                waiting += _inner(name, field.annotation, heading)
+    return found
+
+
+def _tables(root: type[BaseModel]) -> Iterator[str]:
+    """Lines of a document's tables."""
+    for model, heading in tables(root).items():
         yield f"## {f'`{heading}`' if heading else 'At the top'}\n"
         yield f"{_prose(inspect.getdoc(model) or '')}\n"
         yield TABLE
@@ -62,14 +70,13 @@ def _tables(root: type[BaseModel], seen: dict[type[BaseModel], str]) -> Iterator
         for name, field in model.model_fields.items():
             cells = (f"`{name}`", _shape(field), _default(field), _prose(meanings.get(name, "")))
             yield f"| {' | '.join(_cell(cell) for cell in cells)} |"
-            waiting += _inner(name, field.annotation, heading.strip("[]"))
         yield ""
 
 
 def _inner(name: str, annotation: Any, above: str) -> list[tuple[str, type[BaseModel]]]:
     """Tables that a key's value is made of, with their headings."""
     found = []
-    path = f"{above}.{name}" if above else name
+    path = f"{above.partition(' ')[0].strip('[]')}.{name}" if above else name
     for model, many, named in _models(annotation, False, False):
         kind = next((kind for kind, motion in MOTIONS.items() if motion is model), "")
         heading = f"[[{path}]]" if many else f"[{path}.NAME]" if named else f"[{path}]"
@@ -161,8 +168,8 @@ def _default(field: FieldInfo) -> str:
 
 
 def _prose(text: str) -> str:
-    """A docstring as Markdown: double backticks are single ones there."""
-    return re.sub(r"``([^`]+)``", r"`\1`", text)
+    """A docstring as Markdown: what stands in double backticks, or in stars as a name, is code there."""
+    return re.sub(r"``([^`]+)``|(?<!\w)\*(\w+)\*", lambda match: f"`{match[1] or match[2]}`", text)
 
 
 def _cell(text: str) -> str:

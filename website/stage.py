@@ -51,13 +51,20 @@ def stage(repository: Path, source: Path, extra: Path) -> None:
     website = Path(__file__).resolve().parent
     index = (website / "pages" / "index.md").read_text(encoding="utf-8")
     texts["index"] = index + _toctrees(sections(website, tuple(page for page in texts if page != "index")))
-    dead: list[str] = []
+    dead = _dead_in_readme(repository)
     for page, text in texts.items():
         target = source / f"{page}.md"
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(_linked(text, page, repository, source, set(texts), dead), encoding="utf-8")
     if dead:
         raise DeadLinkError("\n".join(dead))
+
+
+def _dead_in_readme(repository: Path) -> list[str]:
+    """Dead links of README.md, which is no page of the site."""
+    targets = (match[2] for match in LINK.findall((repository / "README.md").read_text(encoding="utf-8")))
+    paths = (target.partition("#")[0] for target in targets if not re.match(r"[a-z]+:", target))
+    return [f"README.md: dead link {path}" for path in paths if path and not (repository / path).exists()]
 
 
 def _toctrees(found: tuple[Section, ...]) -> str:

@@ -67,3 +67,22 @@ def exact(p, q, qd, qdd, force):
 def two_points(p, q, qd, qdd, force):
     """Half of a leg's mass at the slider, half at the platform, nothing that turns."""
     return forces(p, q, qd, qdd, force, (p.mb, p.mb, 0.0), 0.0, 0.0)
+
+
+@workbench.forward_kinematics
+def forward(p, q):
+    """Three spheres, in closed form."""
+    return platform(p, q)
+
+
+@workbench.inverse_kinematics
+def inverse(p, x):
+    """A sphere and a slide for each leg, the slider behind the platform."""
+    return x + p.s - p.w - np.sqrt(p.L**2 - ((x**2).sum(axis=1, keepdims=True) - x**2))
+
+
+@workbench.jacobian
+def jacobian(p, q):
+    """Rates of (x, y, z): xd = J qd."""
+    leg = platform(p, q)[:, None] - (q - p.s + p.w)[:, :, None] * SLIDE
+    return np.linalg.solve(leg, dot(leg, SLIDE) * np.eye(3))

@@ -20,7 +20,9 @@ class PrintedCost(Strict):
     """What a formula's authors printed of its computing cost: microseconds per sample, beside what is measured."""
 
     us: Annotated[Finite, Field(gt=0)]
+    """microseconds per sample"""
     source: str = ""
+    """where it is printed, and on which machine it was measured"""
 
 
 class CandidateSpec(Strict):
@@ -30,11 +32,15 @@ class CandidateSpec(Strict):
     """
 
     name: str
+    """a formula of the robot, or one that ``--candidates`` brings"""
     reference: str
+    """mass model of MuJoCo's side: ``distributed``, the model as it is, or ``lumped``"""
     bound: Annotated[Finite, Field(gt=0, le=LARGEST_BOUND)] | None = None
+    """largest ``peak_error`` allowed on each joint; without it the row is measured and not judged"""
     expect_fail: dict[str, Annotated[list[str], Field(min_length=1)]] = Field(default_factory=dict)
     """case -> joints whose error has to exceed the bound there; joints that are not named have to keep it"""
     printed_cost: PrintedCost | None = None
+    """what its authors printed of its cost, shown beside what is measured"""
 
     @model_validator(mode="after")
     def _failure_of_what(self) -> CandidateSpec:

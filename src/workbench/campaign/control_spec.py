@@ -25,8 +25,11 @@ class DelaySpec(Strict):
     """From measuring to the torque that follows: samples, microseconds, or what the formula's authors printed."""
 
     samples: Annotated[Finite, Field(ge=0, le=100)] | None = None
+    """control periods"""
     us: Annotated[Finite, Field(ge=0)] | None = None
+    """microseconds"""
     printed_cost: bool = False
+    """true: what the formula's authors printed of its cost"""
 
     @model_validator(mode="after")
     def _one_of(self) -> DelaySpec:
@@ -47,18 +50,25 @@ class ControlClaim(Strict):
     """A sentence about models in control, and what decides it: the tracking errors of this campaign."""
 
     id: Name
+    """unique"""
     text: str
+    """the claim in words"""
     source: str = ""
+    """where it is printed"""
     kind: Literal["enough", "faster", "grows", "enough-but-fast"]
+    """what decides it"""
     model: str
+    """the model that it is about"""
     against: str
     """the model that *model* is held against"""
     controller: str
+    """with which it is decided"""
     cases: list[str] = Field(default_factory=list)
     """empty is all"""
     speeds: list[Positive] = Field(default_factory=list)
     """empty is all; for ``enough-but-fast`` those that count as fast"""
     note: str = ""
+    """remark in the report"""
 
 
 class ControlSpec(Strict):
@@ -79,22 +89,27 @@ class ControlSpec(Strict):
     speeds: Annotated[list[Positive], Field(min_length=1)] = Field(default_factory=lambda: [1.0])
     """factors of the motions' own"""
     delay: DelaySpec = Field(default_factory=lambda: DelaySpec(samples=0.0))
+    """from measuring to the torque that follows"""
     resolution: dict[str, Positive] = Field(default_factory=dict)
     """by joint: m or rad"""
     noise: dict[str, Positive] = Field(default_factory=dict)
     """by joint: standard deviation of what is measured, m or rad"""
     rate_from: Literal["ideal", "differences"] = "ideal"
+    """where velocities come from: known, or differences of measured positions"""
     seed: Annotated[int, Field(ge=0)] = 0
+    """of the noise; the same seed gives the same numbers"""
     limits: bool = False
     """whether torques end at what the robot's file or the campaign says that the actuators give"""
     plant: dict[str, Finite] = Field(default_factory=dict)
     """parameters of the robot that is moved, where the models do not know them"""
     force_known: bool = True
+    """whether the models know the external force"""
     printed_cost: dict[str, Positive] = Field(default_factory=dict)
     """by model: microseconds a sample"""
     step: Positive | None = None
     """s: longest step of the plant; none is the control period or 1 ms"""
     second_route: Literal["all", "none"] = "all"
+    """which runs are computed by another route too"""
     duration: Positive | None = None
     """s: longest stretch of a motion that is tracked"""
     wanted: Positive = 1e-4
@@ -102,9 +117,13 @@ class ControlSpec(Strict):
     enough: Positive = 0.1
     """a model is enough where its error is larger than the other's by at most this part"""
     time_limit: Positive = 300.0
+    """seconds that one run may take"""
     memory_limit: Annotated[Finite, Field(ge=512, le=1e9)] = 2048.0
+    """megabytes of address space that a worker may take beyond its first"""
     retries: Annotated[int, Field(ge=0, le=100)] = 2
+    """how often a run is tried again after its worker was killed or it ran out of time"""
     claim: list[ControlClaim] = Field(default_factory=list)
+    """sentences about models in control"""
 
     @model_validator(mode="after")
     def _consistent(self) -> ControlSpec:

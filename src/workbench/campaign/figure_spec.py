@@ -15,12 +15,19 @@ class FigureSpec(Strict):
     """A figure: a motion or a torque of one case over time, or the errors of several cases over a number of theirs."""
 
     id: Name
+    """unique"""
     title: str
+    """above the figure"""
     kind: Literal["platform", "platform_velocity", "platform_acceleration", "torque", "error_over"]
+    """what it shows"""
     case: str | None = None
+    """for all kinds but ``error_over``"""
     joint: str | None = None
+    """for ``torque``"""
     curves: list[str] = Field(default_factory=list)
+    """``cand:CANDIDATE`` and ``ref:MASS_MODEL``, of those that the campaign compares"""
     source: str = ""
+    """the paper's own figure"""
     cases: list[str] = Field(default_factory=list)
     """for ``error_over``: the cases, in the order of *abscissa*"""
     abscissa: list[Finite] = Field(default_factory=list)

@@ -42,7 +42,7 @@ def describe(campaign: Campaign, file: Path, model: Path, robot: Robot, case: st
         "joints": list(robot.joints),
         "coordinate_units": list(robot.coordinate_units),
         "force_units": list(robot.force_units),
-        "platform_axes": list(robot.platform_axes),
+        "platform_axes": list(robot.position_axes),
         "mobility_count": robot.mobility_count(),
         "parameters": [
             {

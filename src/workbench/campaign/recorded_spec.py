@@ -27,11 +27,16 @@ class RecordedSpec(Strict):
     label: Label
     """what the tables call it"""
     file: str
+    """table beside the campaign: text, ``.mat`` or ``.parquet``"""
     case: str | None = None
     """may be left out where the campaign has one case"""
     columns: Columns = Field(default_factory=dict)
+    """where quantities stand, by ``t``, joint or torque; by their own names where not said"""
     offset: Finite | Literal["estimate"] = 0.0
     """time of the case less time of the record, s"""
     reference: str = "distributed"
+    """mass model that the torques are held against"""
     bound: Annotated[Finite, Field(gt=0)] | None = None
+    """largest peak error; without one nothing fails"""
     description: str = ""
+    """for the report"""

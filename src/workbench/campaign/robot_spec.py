@@ -17,9 +17,11 @@ class RobotKeys(Strict):
     robot: str | None = None
     """folder of a robot or its robot file, beside the campaign; or the name of a robot that comes along"""
     model: str | None = None
+    """MJCF file beside the campaign, or one that comes along, in place of *robot*"""
     actuated: Annotated[list[str], Field(min_length=1)] | None = None
     """joints that are driven, in the order of q and tau"""
     platform_site: str | None = None
+    """site whose motion is recorded and on which external forces act"""
     platform_body: str | None = None
     """the body whose origin is the platform, in place of a site"""
     fix_base: str | None = None
@@ -27,10 +29,13 @@ class RobotKeys(Strict):
     base_body: str | None = None
     """fixed body in whose frame the platform is seen; the world where not said"""
     keyframe: str | None = None
+    """pose from which the loops are closed; ``home``, or the model as drawn, where not said"""
     initial: dict[str, Finite] = Field(default_factory=dict)
     """coordinates of joints, m and rad, from which the loops are closed: they pick the assembly branch"""
     lumped_bodies: list[str] = Field(default_factory=list)
+    """bars that lose their rotational inertia in the mass model ``lumped``"""
     ignore: list[Ignorable] = Field(default_factory=list)
+    """what of the file may be left out without refusal"""
     read: dict[Identifier, str] = Field(default_factory=dict)
     """parameters that are handed to candidates: name -> where the model holds it"""
 

@@ -50,18 +50,26 @@ class ReplayWindow(Strict):
     """Seconds from start to stop over which torques drive the model; the motion may be defined beyond its samples."""
 
     start: Finite
+    """s"""
     stop: Finite
+    """s"""
 
 
 class CaseSpec(Strict):
     """One robot on one motion."""
 
     name: Name
+    """names the case's file and its rows; unique"""
     title: str = ""
+    """heading in the report"""
     description: str = ""
+    """paragraph in the report"""
     motion: Motion
+    """how the robot moves; its ``kind`` says which keys it has"""
     parameters: dict[str, Finite] = Field(default_factory=dict)
+    """of the robot in this case, over the campaign's, SI"""
     external_force: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    """N, constant, in the base body's frame, exerted on the platform"""
     bounds: dict[str, Annotated[Finite, Field(gt=0)]] = Field(default_factory=dict)
     """by joint: a bound in place of the candidates', where the reference itself is worth less on this case"""
     replay: ReplayWindow | None = None
@@ -75,10 +83,15 @@ class Measure(Strict):
         "peak_speed", "peak_acceleration", "mobility", "rank", "peak_error", "rms_error", "pointwise_error",
         "solution_distance",
     ]  # fmt: skip
+    """a number of the case, or the largest error among the rows that the other keys leave"""
     case: str
+    """the case that it is measured on"""
     candidate: str | None = None
+    """for errors: of this formula; any where not said"""
     reference: str | None = None
+    """for errors: against this mass model; any where not said"""
     joint: str | None = None
+    """for errors: of this joint; any where not said"""
     point: Triple | None = None
     """for ``solution_distance``: a platform position, m; measured is the largest coordinate difference from the nearest
     solution of the forward position problem at the case's first sample"""
@@ -94,35 +107,52 @@ class ClaimSpec(Strict):
     """A figure that a paper prints, and how it is measured here."""
 
     id: Name
+    """unique"""
     text: str
+    """the claim in words"""
     source: str
+    """where it is printed"""
     kind: Literal["upper", "value"]
+    """``upper``: the measured number is smaller than *claimed*; ``value``: it is *claimed* to within *within*"""
     claimed: Finite
+    """the printed number; errors are fractions, 0.05 is 5 %"""
     within: Finite = 0.0
     """for ``value``: half of the last printed digit"""
     unit: str
+    """``%`` shows a fraction in percent"""
     measure: Measure
+    """where the number is found"""
     parameters: dict[str, Finite] = Field(default_factory=dict)
     """of the robot that the claim is about, where they are not those of the robot's file or source"""
     note: str = ""
+    """remark in the report"""
 
 
 class Campaign(RobotKeys):
     """A whole campaign file."""
 
     format: Annotated[Literal[1], BeforeValidator(no_boolean)] = 1
+    """version of this format"""
     name: Name
+    """names the run directory, ``reports/NAME``"""
     title: str
+    """heading of the report"""
     description: str = ""
+    """paragraph below it"""
     parameters: dict[str, Finite] = Field(default_factory=dict)
+    """of the robot in every case, SI"""
     candidate: list[CandidateSpec] = Field(default_factory=list)
     """may be empty where the campaign brings its own mechanism: then the reference alone is computed"""
     case: Annotated[list[CaseSpec], Field(min_length=1)]
+    """one robot on one motion each"""
     recorded: list[RecordedSpec] = Field(default_factory=list)
     """torques from elsewhere; their rows are a kind of their own"""
     claim: list[ClaimSpec] = Field(default_factory=list)
+    """what a paper prints"""
     figure: list[FigureSpec] = Field(default_factory=list)
+    """what the report draws beyond its own figures"""
     sweep: SweepSpec | None = None
+    """varies the one case of the campaign into many"""
     control: ControlSpec | None = None
     """what tracks the cases' motions; then nothing else is computed"""
     good: Annotated[Finite, Field(gt=0)] | None = None

@@ -22,11 +22,15 @@ class Vary(Strict):
     key: str
     """``parameters.a2_left``, ``motion.frequency[0]``, ``external_force[2]``, ``speed``"""
     values: Annotated[list[Finite], Field(min_length=1)] | None = None
+    """the numbers, for ``grid`` and ``list``"""
     low: Finite | None = None
+    """of a range"""
     high: Finite | None = None
+    """of a range, included"""
     count: Annotated[int, Field(ge=2)] | None = None
     """for grids: number of values from low to high, both included"""
     scale: Literal["linear", "log"] = "linear"
+    """how a range is divided: evenly, or by equal factors"""
     relative: bool = False
     """True: the numbers are factors of the value that the key has in the case or the model"""
 
@@ -55,12 +59,17 @@ class SweepSpec(Strict):
     """How one case becomes many, and how they are computed and kept."""
 
     method: Method
+    """every combination; first values of all keys, then second ones; or points that fill the space"""
     samples: Annotated[int, Field(ge=1, le=MAX_CASES)] | None = None
     """for latin_hypercube and sobol: number of cases"""
     seed: Annotated[int, Field(ge=0)] = 0
+    """of a sampled sweep; the same seed gives the same cases"""
     vary: Annotated[list[Vary], Field(min_length=1, max_length=100)]
+    """what varies"""
     filter: Filter = Field(default_factory=Filter)
+    """which cases are left out"""
     keep_series: Literal["failed", "all", "none"] = "failed"
+    """of which cases time series are kept on disk"""
     budget: bool = False
     """True: power balance, forward replay and raw mj_inverse for every case, as in campaigns without a sweep"""
     time_limit: Positive = 60.0

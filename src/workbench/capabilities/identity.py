@@ -76,6 +76,12 @@ class RobotIdentity:
         return tuple(platform.names or platform.task)
 
     @property
+    def position_axes(self) -> tuple[str, str, str]:
+        """Names of x, y, z of the base's frame: as the robot's source writes those that are task coordinates."""
+        named = dict(zip(self.coordinates, self.platform_axes, strict=True))
+        return named.get("x", "x"), named.get("y", "y"), named.get("z", "z")
+
+    @property
     def task_units(self) -> tuple[str, ...]:
         """Unit of each task coordinate, ``m`` or ``rad``."""
         return tuple("rad" if name.startswith("r") else "m" for name in self.coordinates)

@@ -28,7 +28,7 @@ def report(
     from workbench.report import build_report
 
     formats = tuple(dict.fromkeys(format_ or ("html", "md")))
-    with Steps("drawing figures") as show:
+    with Steps("drawing figures, setting pages" if "pdf" in formats else "drawing figures") as show:
         written = build_report(run_dir, formats, style, show, paper, second=True)
     for path in written:
         if path.parent in (run_dir, run_dir / "data"):

@@ -17,8 +17,8 @@ from workbench.library.record import RobotFigures, WorkspaceFigure
 from workbench.library.shelf import Entry
 from workbench.workspace.grid import compute_workspace
 
-CELLS = 40
-"""Cells along the longest side of a workspace: its error stands beside it, and the whole library takes a minute."""
+CELLS = 24
+"""Cells along the longest side of a workspace: its error stands beside it, and the whole library takes minutes."""
 
 UNITS = {3: "m^3", 2: "m^2", 1: "m"}
 

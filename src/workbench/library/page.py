@@ -25,12 +25,13 @@ Errors are of the exact closed form, the largest over joints and cases, as a sha
 largest difference of Pinocchio's torques from MuJoCo's. *Power* is what is left of the power balance, of peak power;
 *replay* the order at which a forward simulation with the formula's torques converges with the time step. *Cost* is the
 exact form's, in numpy. *Mobility* is by Gogu's count and by rank; *rank* is independent rows of all rows of the model's
-loop constraints. *Workspace* is at the home attitude within the joints' ranges, its error half of the border cells.
+loop constraints. *Nearest to singular* is the smallest scaled determinant over the campaign, 1 far away, 0 singular.
+*Workspace* is at the home attitude within the joints' ranges, its error half of the border cells.
 """
 
 COLUMNS = (
     "robot", "topology", "freedoms", "verified", "error, MuJoCo", "engines", "power", "replay", "cost, µs a sample",
-    "mobility, Gogu = rank", "rank", "workspace",
+    "mobility, Gogu = rank", "rank", "nearest to singular", "workspace",
 )  # fmt: skip
 
 WORDS = {
@@ -67,14 +68,15 @@ def row(entry: Entry, figures: RobotFigures | None) -> tuple[str, ...]:
     """The cells of a robot, in the order of `COLUMNS`."""
     count = entry.card.mobility.mobility
     if figures is None:
-        return (entry.name, entry.card.topology, freedoms(entry), "not yet", *["–"] * 5, f"{count}", "–", "–")
+        return (entry.name, entry.card.topology, freedoms(entry), "not yet", *["–"] * 5, f"{count}", "–", "–", "–")
     replay = "–" if figures.replay is None else "{:.2f} to {:.2f}".format(*figures.replay)
     cost = "–" if figures.cost_us is None else f"{figures.cost_us:.2g}"
     agree = "=" if count == figures.mobility else "≠"
     return (
         entry.name, entry.card.topology, freedoms(entry), verified(figures), small(figures.error),
         small(figures.spread), small(figures.power), replay, cost, f"{count} {agree} {figures.mobility}",
-        f"{figures.rank} of {figures.rows}", workspace(figures),
+        f"{figures.rank} of {figures.rows}", "–" if figures.singular is None else f"{figures.singular:.2g}",
+        workspace(figures),
     )  # fmt: skip
 
 
@@ -121,6 +123,8 @@ def _card(entry: Entry, figures: RobotFigures | None) -> str:
         ]
         if figures.workspace is not None:
             facts.append(("workspace", workspace(figures)))
+        if figures.singular is not None:
+            facts.append(("singular", f"smallest scaled determinant over the campaign: {figures.singular:.2g}"))
     facts += [("singular", sentence) for sentence in card.singular]
     folder = f"../examples/{entry.name}"
     picture = f"\n![{spec.title}]({folder}/{card.picture})\n" if card.picture else ""

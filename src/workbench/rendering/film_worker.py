@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from PIL import Image
 
+from workbench.rendering.dressing import dress
 from workbench.rendering.worker import MODEL, POSES, rendered
 
 STILL, FILM = "mechanism.webp", "film.webp"
@@ -29,6 +30,7 @@ def film(folder: Path, width: int, height: int, columns: int) -> None:
     model = mujoco.MjModel.from_binary_path(str(folder / MODEL))
     model.vis.quality.offsamples, model.vis.quality.shadowsize = 0, SHADOWS
     poses = np.load(folder / POSES)
+    dress(model, poses, width / height)
     large = next(rendered(model, poses[:1], 2 * FINER * width, 2 * FINER * height))
     _smaller(large).save(folder / STILL, format="WEBP", quality=STILL_QUALITY, method=4)
     sheet = Image.new("RGB", (columns * width, -(-len(poses) // columns) * height))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.arrays import FloatArray
+from workbench.rendering.dressing import dress
 
 HEADLIGHT = {"ambient": 0.1, "diffuse": 0.4, "specular": 0.5}
 """What MuJoCo gives a model that says nothing."""
@@ -66,8 +67,10 @@ def draw(folder: Path, width: int, height: int, camera: str) -> None:
     pixels = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever drivers print must not get between the pixels
     model = mujoco.MjModel.from_binary_path(str(folder / MODEL))
+    poses = np.load(folder / POSES)
+    dress(model, poses, width / height)
     with pixels:
-        for picture in rendered(model, np.load(folder / POSES), width, height, camera):
+        for picture in rendered(model, poses, width, height, camera):
             pixels.write(picture.tobytes())
 
 

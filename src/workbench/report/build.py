@@ -17,6 +17,7 @@ from markupsafe import Markup, escape
 
 from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
+from workbench.report import kept_drawings
 from workbench.report.bibliography import NAME, bibliography, cited_keys
 from workbench.report.control.load import StudyRun, load_study
 from workbench.report.control.sections import study_sections
@@ -144,19 +145,27 @@ def _rendered(
         from workbench.report.pdf import all_tables, figure_pdf, report_pdf  # Typst is loaded where it is needed
     figures = run.directory / FIGURES
     plots = [plot for section in sections for plot in section.plots]
-    if {"html", "md", "pdf"} & {*formats}:
-        draw(plots, show, second=second)
-    for plot in plots:
+    steps = _Steps(show, len(plots) * (2 if "pdf" in formats else 1) + ("pdf" in formats))
+    # a page takes no drawing from a file: what stands in it can be read by the page's script
+    kept = not {"html", "md"} & {*formats} and isinstance(run, Run)
+    kept = kept and kept_drawings.take(figures, run.directory, style, plots)
+    if {"html", "md", "pdf"} & {*formats} and not kept:
+        draw(plots, steps.to, second=second)
+    for number, plot in enumerate(plots, 1):
         if "md" in formats:
             files[figures / f"{plot.key}.svg"] = standalone(plot.svg, plot.alt).encode()
         if "pdf" in formats:
             files[figures / f"{plot.key}.pdf"] = figure_pdf(plot, style)
+            steps.to(len(plots) + number)
     if "md" in formats:
         files[run.directory / "report.md"] = render_markdown(run, sections).encode()
+        if isinstance(run, Run):
+            files[run.directory / kept_drawings.NAME] = kept_drawings.note(run.directory, style, files)
     if "html" in formats:
         files[run.directory / "report.html"] = render_html(run, sections).encode()
     if "pdf" in formats:
         files[run.directory / "report.pdf"] = report_pdf(run, sections, style, paper)
+        steps.to(steps.total)
         costs = cost_table(run.manifest)
         tables = [*all_tables(sections), *([costs] if costs else [])]
         if isinstance(run, Run):
@@ -165,6 +174,18 @@ def _rendered(
             files[run.directory / TABLES / f"{table.key}.tex"] = latex_table(table, cited_keys()).encode()
         files[run.directory / TABLES / NAME] = bibliography().encode()
     return files
+
+
+class _Steps:
+    """Tells how many figures are drawn and set, and whether the pages are, of all that is to be done."""
+
+    def __init__(self, show: Show | None, total: int) -> None:
+        self._show, self.total = show, total
+
+    def to(self, done: int, _: int = 0) -> None:
+        """So many are done."""
+        if self._show:
+            self._show(done, self.total)
 
 
 def render_html(run: Run | SweepRun | StudyRun, sections: list[Section]) -> str:

@@ -18,6 +18,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from workbench.report.light_axis import lighten
 from workbench.report.shrink import Shapes, merge_lines, relative_path
 from workbench.report.style import THEME
 
@@ -56,6 +57,7 @@ def new_figure(width: float, height: float) -> Figure:
 def svg_of(figure: Figure, key: str) -> str:
     """Draw *figure* as the body of an SVG document: no dates, two decimals, identifiers that start with *key*."""
     panels = _tag(figure)
+    lighten(figure)
     buffer = io.StringIO()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a name in another script: the reader's font has it

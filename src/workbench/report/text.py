@@ -73,8 +73,13 @@ def pretty_unit(unit: str) -> str:
 
 def torque_label(joint: str, unit: str) -> str:
     """Name an actuated joint's generalized force: ``τ2 [N·m]`` of q2, ``τ crank [N·m]`` of a joint called crank."""
+    return f"{torque_name(joint)} [{pretty_unit(unit)}]"
+
+
+def torque_name(joint: str) -> str:
+    """Name the generalized force of an actuated joint: ``τ2`` of q2, ``τ crank`` of a joint called crank."""
     number = _NUMBERED.fullmatch(joint)
-    return f"τ{number[1] if number else ' ' + joint} [{pretty_unit(unit)}]"
+    return f"τ{number[1] if number else ' ' + joint}"
 
 
 def with_unit(text: str, unit: str) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import shlex
 from dataclasses import dataclass
+from functools import lru_cache
 
 from workbench.errors import SpecError, did_you_mean
 from workbench.robots.parameters import Target
@@ -142,7 +143,12 @@ def _product(text: str, where: str) -> tuple[float, tuple[str, ...]]:
 
 def kind_of(target: Target) -> Kind:
     """The kind of place that a target was read from."""
-    return KINDS[shlex.split(target.words)[0]]
+    return KINDS[_first_word(target.words)]
+
+
+@lru_cache(maxsize=4096)
+def _first_word(words: str) -> str:
+    return shlex.split(words)[0]
 
 
 def meaning_of(target: Target) -> str:

@@ -40,6 +40,7 @@ class PlatformSpec(Strict):
     """What moves: a site, and the coordinates that a task is given in."""
 
     site: str = ""
+    """site whose motion is recorded and on which external forces act"""
     body: str = ""
     """the body whose origin is the platform, where the model has no site there"""
     coordinates: Annotated[list[Coordinate], Field(min_length=1, max_length=6)] | None = None
@@ -75,8 +76,11 @@ class ParameterSpec(Strict):
     follows: list[str] = Field(default_factory=list)
     """written where they stand, neither read nor compared: visible geoms"""
     unit: str | None = None
+    """for show; that of the first place where not said"""
     meaning: str = ""
+    """in words"""
     source: str = ""
+    """where the number is from"""
     allowed: str = ""
     """``> 0``, ``>= 0``, ``0 to 1``"""
 
@@ -85,8 +89,11 @@ class BarSpec(Strict):
     """Bodies, or parameters, that stay a uniform slender bar when mass or length is set."""
 
     mass: str
+    """parameter that holds its mass"""
     length: str | None = None
+    """parameter that holds its length"""
     half_length: str | None = None
+    """or half of it"""
     inertia: list[str] = Field(default_factory=list)
     """parameters that hold the bar's transverse inertia"""
     centre: str | None = None
@@ -107,28 +114,45 @@ class RobotSpec(Strict):
     """A whole robot file."""
 
     format: Literal[1] = 1
+    """version of this format"""
     name: Name
+    """names reports and rows"""
     title: str = ""
+    """heading"""
     description: str = ""
+    """a paragraph"""
     reference: str = ""
     """bibliography key of the source, explained in docs/references.md"""
     model: str
+    """the MJCF, in the folder of this file or below"""
     actuated: Annotated[list[str], Field(min_length=1)]
+    """driven joints (hinge or slide), in the order of q and tau"""
     platform: PlatformSpec
+    """what moves"""
     base: str = "world"
+    """fixed body in whose frame platform and forces are given"""
     keyframe: str = ""
+    """pose of the MJCF from which the loops are closed; ``home``, or the model as drawn, where not said"""
     initial: dict[str, Finite] = Field(default_factory=dict)
+    """joint = coordinate, m or rad, over the keyframe's: picks the assembly branch"""
     lumped: list[str] = Field(default_factory=list)
+    """bars that lose their rotational inertia in the mass model ``lumped``"""
     ignore: list[Ignorable] = Field(default_factory=list)
+    """what of the file may be left out without refusal"""
     fix_base: str = ""
     """body on a free joint that is held where it is drawn"""
     formulas: list[str] = Field(default_factory=list)
+    """files with formulas of this robot; a command line runs them, ``--candidates``"""
     limits: dict[str, Range] = Field(default_factory=dict)
+    """actuated joint = ``[low, high]``, m or rad, that a workspace is computed for"""
     actuators: dict[str, ActuatorSpec] = Field(default_factory=dict)
     """what the actuators can give, by joint; a run says by how much it is too little"""
     groups: dict[Identifier, Annotated[list[str], Field(min_length=1)]] = Field(default_factory=dict)
+    """name = parameters that it sets at once"""
     parameters: dict[Identifier, ParameterSpec] = Field(default_factory=dict)
+    """numbers with names"""
     bars: list[BarSpec] = Field(default_factory=list)
+    """bodies that stay uniform bars"""
 
 
 FORM = Form(

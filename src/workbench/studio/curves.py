@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.report.text import torque_name
 from workbench.studio.outcome import Outcome
 
 TORQUE, ERROR, POWER, COORDINATE = "torque", "formula less MuJoCo", "power", "coordinate"
@@ -20,6 +21,8 @@ FORMULA_COLOURS = ("#e8590c", "#2b8a3e", "#c2255c", "#0b7285", "#a17f00")
 BEFORE_COLOUR = "#868e96"
 NOW_COLOUR = "#e03131"
 HEIGHT = 190
+BELOW: Mapping[str, Any] = {"label": "t [s]", "labelSize": 18, "labelFont": "12px sans-serif", "size": 34}
+"""The axis of time."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,13 @@ def unit_of(outcome: Outcome, quantity: str, joint: int) -> str:
     return units.get(quantity, robot.force_units[joint])
 
 
+def title_of(outcome: Outcome, quantity: str, joint: int) -> str:
+    """What a plot shows, with its unit: a torque is named τ, a coordinate by its joint."""
+    name = outcome.case.robot.joints[joint]
+    shown = torque_name(name) if quantity in (TORQUE, ERROR) else name
+    return f"{quantity} {shown} [{unit_of(outcome, quantity, joint)}]"
+
+
 class Curves:
     """Plots in a viser panel, filled again and again."""
 
@@ -107,8 +117,7 @@ class Curves:
             plot.remove()
         with folder:
             self._plots = [
-                self._plot(f"{quantity} {joint} [{unit_of(outcome, quantity, i)}]", self._lines[i], data[i])
-                for i, joint in enumerate(joints)
+                self._plot(title_of(outcome, quantity, i), self._lines[i], data[i]) for i in range(len(joints))
             ]
         self._shape = shape
 
@@ -162,7 +171,7 @@ class Curves:
              "points": {"show": True, "size": 8, "fill": NOW_COLOUR, "stroke": NOW_COLOUR}},
         ]  # fmt: skip
         return self._gui.add_uplot(
-            data, tuple(series), title=title, height=HEIGHT, axes=({**axis}, {**axis, "size": 62}),
+            data, tuple(series), title=title, height=HEIGHT, axes=({**axis, **BELOW}, {**axis, "size": 62}),
             scales={"x": {"time": False}}, cursor={"sync": {"key": "workbench"}, "drag": {"x": True, "y": False}},
             legend={"show": False}, padding=(4, 12, 0, 0),
         )  # fmt: skip

@@ -70,7 +70,7 @@ class Keep:
 
     def _send(self, event: Any, name: str, content: bytes) -> None:
         if event.client is not None:
-            event.client.send_file_download(name, content)
+            event.client.send_file_download(name, content, save_immediately=True)
 
     def _case(self) -> str:
         text, files = campaign_case(self._session, "studio")

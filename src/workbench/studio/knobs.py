@@ -21,6 +21,10 @@ NOTHING = 1e-9
 """SI; a number that is smaller is the zero that a computation left."""
 
 
+ALMOST = 1e-9
+"""Of a step: what rounding leaves of a whole number of them."""
+
+
 @dataclass(frozen=True)
 class Knob:
     """One slider."""
@@ -76,9 +80,14 @@ def _knob(
 ) -> Knob:  # fmt: skip
     own = [values[member] for member in members]
     low, high = _ends(min(own), max(own), info)
+    step = _step(high - low)
+    if low > info.minimum:  # whole steps, outwards: ends that can be read
+        low = max(math.floor(low / step + ALMOST) * step, info.minimum) if low > step else low
+    if high < info.maximum:
+        high = min(math.ceil(high / step - ALMOST) * step, info.maximum)
     meaning = re.sub(r",? *(?:of the )?(?:left|right)\b.*$", "", info.meaning) if len(members) > 1 else info.meaning
     return Knob(
-        name, members, info.unit, meaning, info.source, low, high, _step(high - low), _body(robot, members[0]),
+        name, members, info.unit, meaning, info.source, low, high, step, _body(robot, members[0]),
         info.minimum, info.maximum, settable, part,
     )  # fmt: skip
 

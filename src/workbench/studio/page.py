@@ -13,6 +13,7 @@ import viser
 from workbench.errors import WorkbenchError
 from workbench.robots.assignments import parse_assignment, resolve_changes
 from workbench.studio import words
+from workbench.studio.arrange import Panels
 from workbench.studio.curves import QUANTITIES, Curves
 from workbench.studio.keep import Keep
 from workbench.studio.keys import add_keys
@@ -28,8 +29,6 @@ MARKS_PER_S = 4.0
 """How often the moment is marked in the curves while the motion plays."""
 SETTLED_S = 0.6
 """A slider that rests so long has been let go: the next change is another step back."""
-CONTROLS, RESULTS = 300, 350
-"""Widths of the panels, px."""
 
 
 class Page:
@@ -60,7 +59,7 @@ class Page:
         self.worker = Worker(self._fault)
         server.gui.set_panel_label("workbench studio")
         self._theme()
-        self.scene = Scene(server)
+        self.scene = Scene(server, dark)
         self._results_panel()
         self._controls()
         add_keys(self)
@@ -78,8 +77,6 @@ class Page:
 
     def _results_panel(self) -> None:
         gui: Any = self.server.gui
-        gui.main_panel.dock_right()
-        gui.main_panel.set_width(CONTROLS)
         panel = gui.add_panel()
         with panel.add_tab("Answers"):
             self._head = gui.add_html("")
@@ -89,8 +86,7 @@ class Page:
             self._key = gui.add_html("")
             self._plots = gui.add_folder(None)
             self._verdict, self._peaks, self._poses = gui.add_html(""), gui.add_html(""), gui.add_html("")
-        panel.dock_right()
-        panel.set_width(RESULTS)
+        Panels(self.server, panel)
         self.curves = Curves(gui)
         self.curves.in_the(self._dark)
         self._quantity.on_update(lambda _: self._redraw_curves())
@@ -273,8 +269,7 @@ class Page:
                 self._time.max = max(len(good.t) - 1, 1)
             self.scene.show(good, other)
             self.scene.pose(self.sample)
-            before = f"{words.against_words(session)}"
-            self.curves.show(good, other, str(self._quantity.value), before, self._plots)
+            self.curves.show(good, other, str(self._quantity.value), words.against_words(session), self._plots)
             self._key.content = self.curves.key()
             self.curves.mark(self.sample)
             self._head.content = words.head(session)
@@ -353,8 +348,8 @@ class Page:
             with self._lock:
                 t = self.session.good.t
                 moment += passed * self._speed
-                if moment > t[-1]:
-                    moment = float(t[0])
+                if moment > t[-1]:  # over and over; where a busy machine lets more than a whole motion pass, too
+                    moment = float(t[0] + (moment - t[0]) % max(t[-1] - t[0], 1e-9))
                 self.sample = min(int(t.searchsorted(moment)), len(t) - 1)
                 self.scene.pose(self.sample)
                 if now - marked > 1 / MARKS_PER_S:
@@ -374,6 +369,8 @@ class Page:
         self._dark = dark
         self._theme()
         self.curves.in_the(dark)
+        with self._lock:
+            self.scene.in_the(dark)
         self.worker.ask("show", self._show)
 
     # files

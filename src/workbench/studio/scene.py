@@ -16,8 +16,11 @@ MARKS = ("joints", "loops", "mass centres", "frames", "torques", "reactions", "e
 SHOWN_AT_FIRST = ("joints", "torques", "path")
 
 DRIVEN, PASSIVE, LOOP, CENTRE = (230, 126, 34), (120, 120, 130), (142, 68, 173), (40, 40, 40)
-TORQUE, REACTION, EXTERNAL, GHOST = (230, 126, 34), (41, 128, 185), (192, 57, 43), (150, 150, 160)
+TORQUE, REACTION, EXTERNAL, GHOST = (230, 126, 34), (41, 128, 185), (192, 57, 43), (110, 110, 125)
 PATH = (39, 174, 96)
+FLOOR = (((190, 190, 195), (160, 160, 168)), ((52, 54, 60), (76, 80, 88)))
+"""Colours of the floor's cells and sections, on light and on dark."""
+GHOST_OPACITY = 0.4
 LONGEST_ARROW = 0.35
 """Of the robot's size, for the largest of its kind over the motion."""
 
@@ -25,8 +28,9 @@ LONGEST_ARROW = 0.35
 class Scene:
     """A robot drawn with viser's scene; everything below ``/robot`` and ``/ghost``, world frame, z up."""
 
-    def __init__(self, server: Any) -> None:
+    def __init__(self, server: Any, dark: bool = False) -> None:
         self._scene = server.scene
+        self._dark = dark
         self._server = server
         self._frames: dict[str, list[Any]] = {"/robot": [], "/ghost": []}
         self._drawn: dict[str, tuple[Solid, ...]] = {"/robot": (), "/ghost": ()}
@@ -48,7 +52,7 @@ class Scene:
         self._solids("/robot", outcome, None)
         self._scene_visible("/ghost", ghost is not None)
         if ghost is not None:
-            self._solids("/ghost", ghost, 0.22)
+            self._solids("/ghost", ghost, GHOST_OPACITY)
         self._make_marks(outcome)
 
     def _measure(self, outcome: Outcome) -> None:
@@ -61,16 +65,23 @@ class Scene:
         view = view / np.linalg.norm(view)
         camera = self._server.initial_camera
         camera.look_at = tuple(self.centre)
-        camera.position = tuple(self.centre + 1.35 * self.size * view)
+        camera.position = tuple(self.centre + 1.2 * self.size * view)
         camera.near, camera.far = 0.01 * self.size, 100.0 * self.size
 
+    def in_the(self, dark: bool) -> None:
+        """Draw a floor that is seen on light, or on dark, and does not glare."""
+        self._dark = dark
+        if self._outcome is not None:
+            self._floor(self._outcome)
+
     def _floor(self, outcome: Outcome) -> None:
+        cells, sections = FLOOR[self._dark]
         low, _ = bounds(outcome.movement)
         cell = 10.0 ** np.floor(np.log10(self.size)) / 2
         position = (*self.centre[:2], low[2] - 0.12 * self.size)
         self._scene.add_grid(
             "/floor", width=3 * self.size, height=3 * self.size, cell_size=float(cell), section_size=float(2 * cell),
-            plane="xy", position=position, cell_color=(190, 190, 195), section_color=(160, 160, 168),
+            plane="xy", position=position, cell_color=cells, section_color=sections,
         )  # fmt: skip
 
     def _scene_visible(self, root: str, visible: bool) -> None:

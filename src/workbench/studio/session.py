@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -184,7 +185,12 @@ class Session:
                 return False
             return True
 
-        return reach_of(standing, low, high, feasible, stopped)
+        least, most = reach_of(standing, low, high, feasible, stopped)
+        # whole steps, inwards: ends that can be read, and that the slider can take
+        return (
+            low if least == low else min(math.ceil(least / knob.step) * knob.step, standing),
+            high if most == high else max(math.floor(most / knob.step) * knob.step, standing),
+        )
 
     def robot(self) -> Robot:
         """The robot that is shown."""

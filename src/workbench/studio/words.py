@@ -10,6 +10,7 @@ import numpy as np
 
 from workbench.campaign.compare import Row
 from workbench.campaign.verdict import EXPECTED_FAIL, FAIL, PASS, UNEXPECTED_PASS
+from workbench.report.text import torque_name
 from workbench.studio.outcome import Outcome
 from workbench.studio.reproduce import grouped
 from workbench.studio.session import FILE, STEP, Session
@@ -21,6 +22,7 @@ STYLE = (
     "margin:0.3em 0 0.6em;font-variant-numeric:tabular-nums}.wb td,.wb th{padding:0.12em 0.35em;text-align:right;"
     "border-bottom:1px solid color-mix(in srgb,currentColor 16%,transparent)}.wb td:first-child,.wb th:first-child"
     "{text-align:left;padding-left:0}.wb th{font-weight:600}.wb h3{font-size:0.9rem;margin:0.7em 0 0.1em}"
+    ".mantine-Slider-root+.mantine-NumberInput-root{width:4.4rem!important}"
     ".wb p{margin:0.25em 0}.wb .say{border-left:3px solid;padding:0.25em 0.6em;margin:0.4em 0}.wb small{opacity:.75}"
     "</style>"
 )
@@ -157,7 +159,7 @@ def peaks(session: Session, other: Outcome | None) -> str:
     columns = f"<th>{escape(name)}</th><th>change</th>" if other else ""
     lines = [f"<tr><th>peak</th><th>now</th>{columns}</tr>"]
     rows = [
-        *((f"|tau {j}|, {u}", good.peak_torques()[i].value, other.peak_torques()[i].value if other else None)
+        *((f"|{torque_name(j)}|, {u}", good.peak_torques()[i].value, other.peak_torques()[i].value if other else None)
           for i, (j, u) in enumerate(zip(robot.joints, robot.force_units, strict=True))),
         *((f"|power {j}|, W", good.peak_powers()[i].value, other.peak_powers()[i].value if other else None)
           for i, j in enumerate(robot.joints)),
@@ -206,15 +208,13 @@ def moment(outcome: Outcome, sample: int) -> str:
     """Time and torques of the pose that is drawn."""
     robot = outcome.case.robot
     torques = ", ".join(
-        f"{escape(j)} {number(float(v), 3)} {u}"
+        f"{escape(torque_name(j))} {number(float(v), 3)} {u}"
         for j, u, v in zip(robot.joints, robot.force_units, outcome.tau[sample], strict=True)
     )
     place = ", ".join(
         f"{name} {number(float(v), 3)}" for name, v in zip(robot.platform_axes, outcome.case.x[sample], strict=False)
     )
-    return _page(
-        [f"<p>t = {number(float(outcome.t[sample]))} s · tau: {torques}<br><small>platform {place}</small></p>"]
-    )
+    return _page([f"<p>t = {number(float(outcome.t[sample]))} s · {torques}<br><small>platform {place}</small></p>"])
 
 
 def finite(values: Iterable[float]) -> list[float | None]:

@@ -47,11 +47,10 @@ def _numbers(
 ) -> Assumption:
     """One attribute: its worst number."""
     found = vector(context.model, next(iter(targets.values())), context.file)
-    worst, shown = -1.0, ("", "", True, "")
+    worst, shown = -1.0, (0.0, 0.0, 0.0, True, 0, "")
     for index, value in enumerate(found):
         if index in targets:
-            expected = targets[index].number(values)
-            why = " * ".join([f"{targets[index].factor:g}", *targets[index].of])
+            expected, why = targets[index].number(values), ""
         elif attribute in ("pos", "gravity"):
             expected, why = 0.0, "on the axis"
         else:
@@ -63,8 +62,13 @@ def _numbers(
         badness = abs(value - expected) / scale if np.isfinite(value) else np.inf
         if badness > worst:
             worst = badness
-            shown = (f"{value:.9g}", f"{expected:.9g} within {limit:.2g}", ok, f"number {index + 1}: {why}")
-    return context.rule("number", tag, element, attribute, *shown)
+            shown = float(value), expected, limit, ok, index, why
+    value, expected, limit, ok, index, why = shown
+    why = why or " * ".join([f"{targets[index].factor:g}", *targets[index].of])
+    return context.rule(
+        "number", tag, element, attribute, f"{value:.9g}", f"{expected:.9g} within {limit:.2g}", ok,
+        f"number {index + 1}: {why}",
+    )  # fmt: skip
 
 
 def check_assumptions(loaded: LoadedModel) -> list[Assumption]:
