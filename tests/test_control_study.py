@@ -17,7 +17,7 @@ from workbench.campaign.control_spec import BUILT_IN, ControlClaim, ControlSpec,
 from workbench.campaign.run import run_campaign
 from workbench.campaign.spec import load_campaign
 from workbench.commands.studies import refuse_options
-from workbench.control.claims import HOLDS, REFUTED, UNDECIDED, Known, judged
+from workbench.control.claims import HOLDS, NOT_RUN, REFUTED, UNDECIDED, Known, judged
 from workbench.control.evaluate import Study, compute, evaluate
 from workbench.control.files import ERROR_COLUMNS, LOOP_COLUMNS
 from workbench.control.loop import TRACKED, UNSTABLE
@@ -256,6 +256,18 @@ def test_claims_about_speed_and_rate() -> None:
     assert verdict_of("faster", at_cost | {(1.0, "printed cost", "lumped"): (5e-4,) * 3}) == HOLDS
     assert verdict_of("faster", at_cost | {(1.0, "printed cost", "lumped"): (2e-3,) * 3}) == REFUTED
     assert verdict_of("faster", exact) == UNDECIDED  # no run at a printed cost
+
+
+def test_what_was_not_run_changes_no_verdict() -> None:
+    """At high rates no run is made again at half the step."""
+    claim = ControlClaim(id="c", text="t", kind="enough", model="lumped", against="distributed",
+                         controller="computed torque")  # fmt: skip
+    errors = {"rms": 1e-3, "rms_second": 1.001e-3}
+    runs = [Known(Loop("swing", "computed torque", m, 1.0, 4000.0, "4000", 10.0), errors) for m in SPEC["models"]]
+    verdict = judged(ControlSpec(**SPEC, claim=[claim]), runs)[0]
+    assert verdict.verdict == HOLDS
+    assert verdict.varied["half the step"] == NOT_RUN
+    assert verdict.varied["MuJoCo's integrator and loops"] == HOLDS
 
 
 class InThisProcess:

@@ -17,6 +17,9 @@ from workbench.control.plan import Loop
 
 HOLDS, REFUTED, UNDECIDED = "holds", "does not hold", "cannot be decided"
 
+NOT_RUN = "not run"
+"""Nothing was computed that way, as half the step at high rates."""
+
 ROUTES = ("rms", "rms_halved", "rms_second")
 """Columns of the platform's error: the plant's step, half of it, MuJoCo's route."""
 
@@ -235,8 +238,9 @@ def judged(spec: ControlSpec, runs: Sequence[Known]) -> list[Verdict]:
     for claim in spec.claim:
         judge = JUDGES[claim.kind]
         verdict, sentence = judge(claim, points_of(claim, spec, runs))
-        varied = {ROUTE_NAMES[route]: judge(claim, points_of(claim, spec, runs, route))[0] for route in ROUTES[1:]}
+        others = {ROUTE_NAMES[route]: points_of(claim, spec, runs, route) for route in ROUTES[1:]}
         for width in spec.bandwidths:
-            varied[f"bandwidth {width:g} Hz"] = judge(claim, points_of(claim, spec, runs, bandwidth=width))[0]
+            others[f"bandwidth {width:g} Hz"] = points_of(claim, spec, runs, bandwidth=width)
+        varied = {name: judge(claim, points)[0] if points else NOT_RUN for name, points in others.items()}
         found.append(Verdict(claim.id, claim.text, claim.source, verdict, sentence, varied, claim.note))
     return found
