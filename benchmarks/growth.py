@@ -1,90 +1,199 @@
-"""How the reference's cost grows with samples and joints, on towers of four-bars; exponents by least squares of logs.
+"""How cost grows: samples, joints, loops, candidates, cases, workers; exponents by least squares of logarithms.
 
-python benchmarks/growth.py [--stages 2 5 10 20] [--samples 101 1001 5001]
+    python benchmarks/growth.py [--quick] [--figure growth.svg]
+
+CPU time, least of some calls, since others may use the machine; each size in a process of its own, whose peak memory
+beyond that of the smallest one stands beside. Prints tables in Markdown.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import resource
+import subprocess
+import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+import machines
 import numpy as np
 
-HEAD = '<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"><flag contact="disable"/></option>'
+ROOT = Path(__file__).resolve().parents[1]
+CALLS = 4
+
+SIZES: dict[str, tuple[int, ...]] = {
+    "joints": (6, 15, 30, 60),
+    "samples": (101, 501, 2001, 8001),
+    "legs": (6, 8, 10, 12),
+    "candidates": (1, 2, 4, 8),
+    "cases": (24, 48, 96),
+    "workers": (1, 2),
+}
+QUICK = {
+    "joints": (6, 15),
+    "samples": (101, 501),
+    "legs": (6, 8),
+    "candidates": (1, 2),
+    "cases": (6, 12),
+    "workers": (1,),
+}
+MOST = {"joints": 3.0, "samples": 1.1, "legs": 3.0, "candidates": 1.1, "cases": 1.1}
+"""Exponents that are no more than they have to be."""
 
 
-def tower(stages: int) -> str:
-    """*stages* planar four-bars, each on the coupler of the one below: three joints, a loop and a motor each."""
-    inside, loops, motors = "", "", ""
-    for k in reversed(range(stages)):
-        height = 0.09 + 0.002 * (k % 5)
-        inside = (
-            f'<body name="crank{k}"><joint name="q{k}" axis="0 1 0"/>'
-            f'<geom type="capsule" fromto="0 0 0 0 0 {height}" size=".01" mass="0.5"/>'
-            f'<body name="coupler{k}" pos="0 0 {height}"><joint name="a{k}" axis="0 1 0"/>'
-            f'<geom type="capsule" fromto="0 0 0 .2 0 .03" size=".01" mass="0.5"/><site name="top{k}"/>'
-            f'<body name="rocker{k}" pos="0.2 0 0"><joint name="b{k}" axis="0 1 0"/>'
-            f'<geom type="capsule" fromto="0 0 0 0.02 0 {-height}" size=".01" mass="0.5"/>'
-            f'<site name="s{k}" pos="0 0 {-height}"/></body>'
-            f'<body name="next{k}" pos="0.1 0 0.02" euler="0 0 0.2">{inside}</body></body></body>'
-            f'<site name="f{k}" pos="0.2 0 0"/>'
-        )
-        loops += f'<connect name="loop{k}" site1="s{k}" site2="f{k}"/>'
-        motors += f'<motor joint="q{k}"/>'
-    said = f'<text name="base_body" data="world"/><text name="platform_site" data="top{stages - 1}"/>'
-    return (
-        f'{HEAD}<custom>{said}</custom><worldbody><body name="ground">{inside}</body></worldbody>'
-        f"<equality>{loops}</equality><actuator>{motors}</actuator></mujoco>"
-    )
+def least(work: Callable[[int], object]) -> float:
+    """Least CPU seconds of some calls, the first of which, which compiles, does not count."""
+    work(0)
+    found = np.inf
+    for call in range(1, CALLS + 1):
+        clock = time.process_time()
+        work(call)
+        found = min(found, time.process_time() - clock)
+    return float(found)
 
 
-def seconds(path: Path, samples: int, calls: int) -> float:
-    """Least CPU time of one motion's inverse dynamics; the reference is made and its kernels are compiled before."""
+def reference_seconds(text: str, samples: int) -> float:
+    """Inverse dynamics of one motion by the reference."""
     import workbench as wb
 
-    reference = wb.MujocoReference(path)
-    t = np.linspace(0.0, 1.0, samples)[:, None]
-    rate = 2.0 * np.pi
-    least = np.inf
-    for call in range(calls):
-        size = 0.05 + 1e-6 * call  # another motion each time, so that nothing is at hand
-        q = reference.home + size * np.sin(rate * t)
-        qd, qdd = size * rate * np.cos(rate * t) + 0 * q, -size * rate**2 * np.sin(rate * t) + 0 * q
-        clock = time.process_time()
-        reference.inverse_dynamics(q, qd, qdd, along=t[:, 0])
-        least = min(least, time.process_time() - clock)
-    return least
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "machine.xml"
+        path.write_text(text)
+        reference = wb.MujocoReference(path)
+    t, rate = np.linspace(0.0, 1.0, samples)[:, None], 2.0 * np.pi
+
+    def motion(call: int) -> object:
+        size = 0.02 + 1e-6 * call  # another motion each time, so that nothing is at hand
+        push = machines.together(reference, size * np.sin(rate * t))
+        speed = machines.together(reference, size * rate * np.cos(rate * t))
+        rise = machines.together(reference, -size * rate**2 * np.sin(rate * t))
+        return reference.inverse_dynamics(reference.home + push, speed, rise, along=t[:, 0])
+
+    return least(motion)
 
 
-def exponent(sizes: list[int], values: list[float]) -> float:
+def candidates_seconds(count: int) -> float:
+    """One case of the paper's campaign with so many candidates."""
+    from workbench.campaign.candidate_spec import CandidateSpec
+    from workbench.campaign.cases import resolve_cases
+    from workbench.campaign.compare import compute_case
+    from workbench.campaign.evidence import Effort
+    from workbench.campaign.spec import load_campaign
+
+    file = ROOT / "campaigns" / "almeida_2010.toml"
+    campaign = load_campaign(file)[0]
+    case = resolve_cases(campaign, file, only=(campaign.case[0].name,))[0]
+    names = (list(case.robot.candidates) * count)[:count]
+    # every row is computed; what torques cost is the closed forms' own matter and small beside
+    wanted = campaign.model_copy(
+        update={"candidate": [CandidateSpec(name=name, reference="distributed") for name in names]}
+    )
+    return least(lambda _: compute_case(wanted, case, Effort.of_many()))
+
+
+def cases_seconds(count: int) -> float:
+    """So many cases of the design sweep, in this process."""
+    from workbench.campaign.evidence import Effort
+    from workbench.campaign.spec import load_campaign
+    from workbench.sweep.evaluate import Context
+    from workbench.sweep.identity import common_key
+    from workbench.sweep.plan import plan_sweep
+    from workbench.sweep.run import task_of
+
+    file = ROOT / "campaigns" / "design_sweep.toml"
+    campaign = load_campaign(file)[0]
+    assert campaign.sweep is not None
+    effort = Effort.of_many(("mujoco",), campaign.sweep.budget)
+    plan = plan_sweep(campaign, file, None, {})
+    common = common_key(campaign, file, plan.model, {}, effort, campaign.sweep.keep_series)
+    compute = Context(campaign, file, plan.model, {}, effort, plan.recipe, common).setup()
+    return least(lambda call: [compute(task_of(plan, 100 * call + index)) for index in range(count)])
+
+
+def workers_seconds(count: int) -> float:
+    """A sweep of 96 cases by so many workers: CPU of all processes, workers' start included."""
+    text = (ROOT / "campaigns" / "design_sweep.toml").read_text()
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "sweep.toml"
+        file.write_text(text.replace("samples = 10000", "samples = 96"))
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = ["run", str(file), "--jobs", str(count), "--out", str(Path(folder) / "out")]
+        subprocess.run([sys.executable, "-m", "workbench", *command], check=True, capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+MEASURES: dict[str, Callable[[int], float]] = {
+    "joints": lambda n: reference_seconds(machines.tower(n // 3), 501),
+    "samples": lambda n: reference_seconds(machines.tower(3), n),
+    "legs": lambda n: reference_seconds(machines.stewart(n), 501),
+    "candidates": candidates_seconds,
+    "cases": cases_seconds,
+    "workers": workers_seconds,
+}
+
+
+def measured(what: str, size: int) -> tuple[float, float]:
+    """CPU seconds and peak memory, MB, in a process of its own."""
+    run = subprocess.run(
+        [sys.executable, __file__, "--one", what, str(size)], check=True, capture_output=True, text=True
+    )
+    seconds, memory = json.loads(run.stdout)
+    return float(seconds), float(memory)
+
+
+def exponent(sizes: tuple[int, ...], values: list[float]) -> float:
     """Slope of the logarithms."""
     return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
 
 
+def draw(found: dict[str, list[tuple[float, float]]], sizes: dict[str, tuple[int, ...]], path: Path) -> None:
+    """All series over their sizes, both as multiples of the smallest."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.0))
+    axes = figure.add_subplot()
+    for what, rows in found.items():
+        if len(rows) < 2 or what == "workers":
+            continue
+        x, y = np.array(sizes[what]) / sizes[what][0], np.array([seconds for seconds, _ in rows]) / rows[0][0]
+        axes.loglog(x, y, "o-", label=f"{what} from {sizes[what][0]}")
+    reach = np.array(axes.get_xlim())
+    for power in (1, 2, 3):
+        axes.loglog(reach, reach**power, ":", color="0.6", linewidth=0.8)
+    axes.set(xlabel="size, of the smallest", ylabel="CPU time, of the smallest's", ylim=(0.8, None))
+    axes.legend(frameon=False)
+    figure.savefig(path, bbox_inches="tight", metadata={"Date": None})
+
+
 def main() -> None:
-    """Measure and print a table in Markdown."""
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--stages", type=int, nargs="+", default=[2, 5, 10, 20])
-    parser.add_argument("--samples", type=int, nargs="+", default=[101, 1001, 5001])
-    parser.add_argument("--calls", type=int, default=5)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--only", nargs="+", choices=list(SIZES), default=list(SIZES))
+    parser.add_argument("--figure", type=Path)
+    parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
     given = parser.parse_args()
-    table: dict[tuple[int, int], float] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for stages in given.stages:
-            path = Path(folder) / f"tower{stages}.xml"
-            path.write_text(tower(stages))
-            for samples in given.samples:
-                table[stages, samples] = seconds(path, samples, given.calls)
-    print("| joints | loops | " + " | ".join(f"{n} samples, us each" for n in given.samples) + " | exponent |")
-    print("|---" * (3 + len(given.samples)) + "|")
-    for stages in given.stages:
-        row = [table[stages, n] for n in given.samples]
-        cells = [f"{1e6 * value / n:.1f}" for value, n in zip(row, given.samples, strict=True)]
-        print(f"| {3 * stages} | {stages} | {' | '.join(cells)} | {exponent(given.samples, row):.2f} |")
-    fits = [exponent(given.stages, [table[stages, n] for stages in given.stages]) for n in given.samples]
-    print("| exponent in joints | | " + " | ".join(f"{fit:.2f}" for fit in fits) + " | |")
+    if given.one:
+        seconds = MEASURES[given.one[0]](int(given.one[1]))
+        print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
+        return
+    sizes = QUICK if given.quick else SIZES
+    found: dict[str, list[tuple[float, float]]] = {}
+    for what in given.only:
+        found[what] = [measured(what, size) for size in sizes[what]]
+        print(f"\n| {what} | " + " | ".join(map(str, sizes[what])) + " | exponent |")
+        print("|---" * (len(sizes[what]) + 2) + "|")
+        seconds, memory = zip(*found[what], strict=True)
+        fit = f"{exponent(sizes[what], list(seconds)):.2f}" if len(seconds) > 1 else ""
+        note = "" if not fit or what not in MOST or float(fit) <= MOST[what] else f" (more than {MOST[what]:g})"
+        print("| CPU, ms | " + " | ".join(f"{1e3 * value:.3g}" for value in seconds) + f" | {fit}{note} |")
+        print("| peak memory, MB | " + " | ".join(f"{value:.0f}" for value in memory) + " | |", flush=True)
+    if given.figure:
+        draw(found, sizes, given.figure)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +14,20 @@ import pytest
 
 from small_campaign import Workbench
 from workbench.campaign.control_spec import BUILT_IN, ControlClaim, ControlSpec, DelaySpec
+from workbench.campaign.run import run_campaign
 from workbench.campaign.spec import load_campaign
-from workbench.control.claims import HOLDS, REFUTED, UNDECIDED, Known, judged
+from workbench.commands.studies import refuse_options
+from workbench.control.claims import HOLDS, NOT_RUN, REFUTED, UNDECIDED, Known, judged
 from workbench.control.evaluate import Study, compute, evaluate
 from workbench.control.files import ERROR_COLUMNS, LOOP_COLUMNS
 from workbench.control.loop import TRACKED, UNSTABLE
 from workbench.control.plan import Loop, StudyPlan, plan_study
+from workbench.control.run import run_study
 from workbench.control.sampling import Encoder, Sampling
 from workbench.control.user_controller import load_controllers
-from workbench.errors import CandidateError, SpecError, WorkbenchError
+from workbench.errors import CandidateError, OutputError, SpecError, WorkbenchError
 from workbench.report.build import build_report
+from workbench.report.load import load_run
 
 CAMPAIGN = """
 format = 1
@@ -229,6 +234,11 @@ def test_a_model_is_enough_where_that_is_known(lumped: tuple[float, ...], verdic
 def test_an_error_that_nobody_minds_is_enough() -> None:
     errors = {(1.0, "500", "lumped"): (5e-5,) * 3, (1.0, "500", "distributed"): (1e-6,) * 3}
     assert verdict_of("enough", errors) == HOLDS
+    # but only where two routes say so, and both below what matters
+    errors[1.0, "500", "lumped"] = (9.9e-5, 9.9e-5, 1.2e-4)
+    assert verdict_of("enough", errors) != HOLDS
+    errors[1.0, "500", "lumped"] = (5e-5, 5e-5)
+    assert verdict_of("enough", errors) == UNDECIDED
 
 
 def test_claims_about_speed_and_rate() -> None:
@@ -248,6 +258,78 @@ def test_claims_about_speed_and_rate() -> None:
     assert verdict_of("faster", exact) == UNDECIDED  # no run at a printed cost
 
 
+def test_what_was_not_run_changes_no_verdict() -> None:
+    """At high rates no run is made again at half the step."""
+    claim = ControlClaim(id="c", text="t", kind="enough", model="lumped", against="distributed",
+                         controller="computed torque")  # fmt: skip
+    errors = {"rms": 1e-3, "rms_second": 1.001e-3}
+    runs = [Known(Loop("swing", "computed torque", m, 1.0, 4000.0, "4000", 10.0), errors) for m in SPEC["models"]]
+    verdict = judged(ControlSpec(**SPEC, claim=[claim]), runs)[0]
+    assert verdict.verdict == HOLDS
+    assert verdict.varied["half the step"] == NOT_RUN
+    assert verdict.varied["MuJoCo's integrator and loops"] == HOLDS
+
+
+class InThisProcess:
+    """Computes the runs of a study one after the other, without workers."""
+
+    def __init__(self, jobs: int, setup: Callable[[], Callable[[Any], Any]], *limits: float) -> None:
+        self._compute = setup()
+
+    def run(self, tasks: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
+        yield from ((index, self._compute(task)) for index, task in tasks)
+
+    def close(self) -> None:
+        pass
+
+
+CLAIM = """
+[[control.claim]]
+id = "enough"
+text = "lumped is enough"
+source = "somebody"
+kind = "enough"
+model = "lumped"
+against = "distributed"
+controller = "computed torque"
+"""
+
+
+def test_what_a_study_found_stands_in_its_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("workbench.control.run.Supervisor", InThisProcess)
+    rates = ("rates = [500.0]", "rates = [250.0, 500.0]\nspeeds = [0.5, 1.0]")
+    path = write(tmp_path, rates, ("bandwidths = [10.0]", "bandwidths = [10.0, 300.0]"), more=CLAIM)
+    out = tmp_path / "out"
+    outcome = run_study(*load_campaign(path), out, report=lambda directory: build_report(directory, ("html", "md")))
+    assert outcome.conclusion.exit_code == 0
+    assert (outcome.summary["runs"], outcome.summary["tracked"], outcome.summary["unstable"]) == (16, 8, 8)
+    assert outcome.summary["claims"][0]["verdict"] in (HOLDS, REFUTED, UNDECIDED)
+    report = (out / "report.md").read_text(encoding="utf-8")
+    for said in (
+        "Is the model enough for control", "lumped is enough", "half the step", "MuJoCo's integrator and loops",
+        "Tracking error over the control rate", "Tracking error over the speed", "What the model adds", "Stability",
+        "8 of 16 runs do not track", "unstable at t = 0.0", "Damping ratio", "Limits and caveats",
+    ):  # fmt: skip
+        assert said in report, said
+    assert list((out / "figures").glob("figure-control-rate-*.svg"))
+    assert "<script" in (out / "report.html").read_text(encoding="utf-8")
+    # the same again computes nothing; a reader of cases is told where to look
+    assert run_study(*load_campaign(path), out).manifest["computed"] == 0
+    with pytest.raises(OutputError, match="holds a study of 16 runs under control"):
+        load_run(out)
+    (out / "runs.parquet").write_bytes(b"torn")
+    with pytest.raises(OutputError, match=r"runs\.parquet: not a readable Parquet file"):
+        build_report(out)
+
+
+def test_other_commands_say_that_a_campaign_has_control(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    with pytest.raises(SpecError, match=r"has \[control\]"):
+        run_campaign(path, tmp_path / "out")
+    with pytest.raises(SpecError, match="--quick does not go with a campaign that has"):
+        refuse_options("x.toml", only=None, quick=True)
+
+
 def test_every_key_is_documented(repository: Path) -> None:
     text = (repository / "docs" / "control.md").read_text(encoding="utf-8")
     keys = {*ControlSpec.model_fields, *ControlClaim.model_fields, *DelaySpec.model_fields}
@@ -261,16 +343,7 @@ def test_a_study_is_the_same_by_any_number_of_workers_and_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bench = Workbench(tmp_path, monkeypatch, capsys)
-    more = """
-[[control.claim]]
-id = "enough"
-text = "lumped is enough"
-kind = "enough"
-model = "lumped"
-against = "distributed"
-controller = "computed torque"
-"""
-    text = CAMPAIGN.replace("rates = [500.0]", "rates = [200.0, 500.0]\nspeeds = [0.5, 1.0]") + more
+    text = CAMPAIGN.replace("rates = [500.0]", "rates = [200.0, 500.0]\nspeeds = [0.5, 1.0]") + CLAIM
     one, two = bench.run(text, "--out", "one", "--jobs", "1"), bench.run(text, "--out", "two", "--jobs", "2")
     assert one.code == two.code == 0, one.err + two.err
     names = ("runs.parquet", "errors.parquet", "control.json", "journal.jsonl")

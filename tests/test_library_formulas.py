@@ -166,7 +166,7 @@ def seen(name: str, text: str, values: dict[str, float], edits: list[Edit]) -> b
 IDLE = {
     "zero = np.zeros((len(q), 3))", "turn, spin, swing, rate, add, tau = zero, zero, zero, zero, zero, 0.0",
     "for part in (0, 1):  # to the mass centre, then to the far end", "for j in (0, 1):", "tau = np.empty_like(q)",
-    "near, far, cross = masses", "near, far, both = masses", "LEGS = range(1, 7)", ")[:, 0]",
+    "at, rate, add = foot", "near, far, cross = masses", "near, far, both = masses", "LEGS = range(1, 7)", ")[:, 0]",
     "x = np.zeros(elbow.shape)", "x = np.zeros((len(elbow), 3))", "x = np.zeros_like(q)",
     "x[:, 0], x[:, 1] = p.hx, p.hz", "NEXT = np.roll(np.arange(3), -1)",
     # with one freedom a body's rate is along its unit turn, and the gyroscopic moment does no work on it

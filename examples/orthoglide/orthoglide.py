@@ -85,4 +85,4 @@ def inverse(p, x):
 def jacobian(p, q):
     """Rates of (x, y, z): xd = J qd."""
     leg = platform(p, q)[:, None] - (q - p.s + p.w)[:, :, None] * SLIDE
-    return np.linalg.solve(leg, dot(leg, SLIDE) * np.eye(3))
+    return np.linalg.inv(leg) * dot(leg, SLIDE).transpose(0, 2, 1)

@@ -127,7 +127,7 @@ class Robot(RobotIdentity):
         """
         if self._loaded is None:
             same = self._values == self._base.loaded.values
-            self._loaded = self._base.loaded if same else with_overrides(self._base, self._values)
+            self._loaded = self._base.loaded if same else with_overrides(self._base, self._values, whole=True)
         return self._loaded
 
     @property

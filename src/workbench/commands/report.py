@@ -26,10 +26,11 @@ def report(
     """
     from workbench.console import Steps
     from workbench.report import build_report
+    from workbench.report.kept_drawings import NAME as KEPT
 
     formats = tuple(dict.fromkeys(format_ or ("html", "md")))
     with Steps("drawing figures, setting pages" if "pdf" in formats else "drawing figures") as show:
         written = build_report(run_dir, formats, style, show, paper, second=True)
     for path in written:
-        if path.parent in (run_dir, run_dir / "data"):
+        if path.parent in (run_dir, run_dir / "data") and path.name != KEPT:
             typer.echo(str(path))

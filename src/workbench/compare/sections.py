@@ -20,7 +20,7 @@ from workbench.report.plot import Plot
 from workbench.report.section import Section, plain_section
 from workbench.report.sections import unique_keys
 from workbench.report.tables import Cell, Table, columns, verdict_status
-from workbench.report.text import exact, percent, pretty_unit, scientific, with_unit
+from workbench.report.text import exact, percent, pretty_unit, scientific, torque_name, with_unit
 
 BY_CASE = ("peak", "rms", "speed", "power", "work")
 """Figures of an actuator in the table of all cases."""
@@ -294,7 +294,7 @@ def _errors(
     groups: dict[tuple[str, str, str], dict[str, ErrorChange]] = {}
     for one in found:
         groups.setdefault((one.case, one.candidate, one.reference), {})[one.joint] = one
-    rows = []
+    rows, torques = [], [torque_name(joint) for joint in joints]
     for (case, candidate, reference), by_joint in groups.items():
         cells = [_error(by_joint[joint], show, floor) if joint in by_joint else Cell("–") for joint in joints]
         last = next((one.after for one in by_joint.values() if one.after is not None), None)
@@ -303,9 +303,9 @@ def _errors(
     return Table(
         f"errors-{key}",
         shows,
-        columns(("Case", "Candidate", "Reference", *joints, "Verdict in B"), joints),
+        columns(("Case", "Candidate", "Reference", *torques, "Verdict in B"), torques),
         tuple(rows),
-        f"Peak error max|Δτ| / max|τ_ref| of that joint over the case. “=” the same bits, “~” both below {floor:g},"
+        f"Peak error max|Δτ| / max|τ_ref| over the case. “=” the same bits, “~” both below {floor:g},"
         " which is rounding; ×2 and /2 grew and fell by that factor.",
     )
 

@@ -13,13 +13,18 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from workbench.campaign.control_spec import PRINTED_COST, ControlClaim, ControlSpec
-from workbench.control.figures import DECIDED
 from workbench.control.plan import Loop
 
 HOLDS, REFUTED, UNDECIDED = "holds", "does not hold", "cannot be decided"
 
+NOT_RUN = "not run"
+"""Nothing was computed that way, as half the step at high rates."""
+
 ROUTES = ("rms", "rms_halved", "rms_second")
 """Columns of the platform's error: the plant's step, half of it, MuJoCo's route."""
+
+MANY = 2.0
+"""Shares beyond this read better as so many times the error."""
 
 ROUTE_NAMES = {"rms": "as computed", "rms_halved": "half the step", "rms_second": "MuJoCo's integrator and loops"}
 
@@ -102,11 +107,21 @@ def points_of(
         shares = [_share(one[r], other[r]) for r in ROUTES if r in one and r in other]
         spread = max((abs(value - share) for value in shares), default=math.nan) if math.isfinite(share) else 0.0
         vouched = spec.second_route == "none" or ("rms_second" in one and "rms_second" in other)
+        others = [abs(one[r] - error) for r in ROUTES if r in one and r != route]
+        known = max(others, default=math.nan) if vouched else math.nan
         # one route alone vouches for nothing
         uncertainty = spread if not math.isfinite(share) or (vouched and len(shares) > 1) else math.nan
         found.append(
             Point(
-                case, speed, rate, width, error, against, share, uncertainty, _enough(error, share, uncertainty, spec)
+                case,
+                speed,
+                rate,
+                width,
+                error,
+                against,
+                share,
+                uncertainty,
+                _enough(error, known, share, uncertainty, spec),
             )
         )
     return found
@@ -122,9 +137,9 @@ def _share(error: float, against: float) -> float:
     return error / against - 1.0 if against > 0.0 else math.nan
 
 
-def _enough(error: float, share: float, uncertainty: float, spec: ControlSpec) -> bool | None:
-    """Enough where the error does not matter, or is hardly larger than the other model's."""
-    if error * (1.0 + DECIDED) <= spec.wanted:
+def _enough(error: float, known: float, share: float, uncertainty: float, spec: ControlSpec) -> bool | None:
+    """Enough where the error, *known* to so much, does not matter, or is hardly larger than the other model's."""
+    if error + known <= spec.wanted:
         return True
     if math.isnan(share) or math.isnan(uncertainty):
         return None
@@ -144,10 +159,16 @@ def _worst(points: Sequence[Point]) -> str:
     if math.isinf(worst.error):
         return f"unstable in {worst.case} at speed {worst.speed:g}, {_rate(worst)}, {worst.bandwidth:g} Hz bandwidth"
     return (
-        f"at worst {100 * worst.share:+.3g} % (known to {100 * worst.uncertainty:.2g} %) in {worst.case} at speed"
+        f"at worst {_added(worst)} in {worst.case} at speed"
         f" {worst.speed:g}, {_rate(worst)}, bandwidth {worst.bandwidth:g} Hz: {1e3 * worst.error:.3g} mm against"
         f" {1e3 * worst.against:.3g} mm"
     )
+
+
+def _added(point: Point) -> str:
+    if point.share > MANY:
+        return f"{1.0 + point.share:.3g} times the other's error (known to {point.uncertainty:.2g})"
+    return f"{100 * point.share:+.3g} % (known to {100 * point.uncertainty:.2g} %)"
 
 
 def _rate(point: Point) -> str:
@@ -217,8 +238,9 @@ def judged(spec: ControlSpec, runs: Sequence[Known]) -> list[Verdict]:
     for claim in spec.claim:
         judge = JUDGES[claim.kind]
         verdict, sentence = judge(claim, points_of(claim, spec, runs))
-        varied = {ROUTE_NAMES[route]: judge(claim, points_of(claim, spec, runs, route))[0] for route in ROUTES[1:]}
+        others = {ROUTE_NAMES[route]: points_of(claim, spec, runs, route) for route in ROUTES[1:]}
         for width in spec.bandwidths:
-            varied[f"bandwidth {width:g} Hz"] = judge(claim, points_of(claim, spec, runs, bandwidth=width))[0]
+            others[f"bandwidth {width:g} Hz"] = points_of(claim, spec, runs, bandwidth=width)
+        varied = {name: judge(claim, points)[0] if points else NOT_RUN for name, points in others.items()}
         found.append(Verdict(claim.id, claim.text, claim.source, verdict, sentence, varied, claim.note))
     return found

@@ -86,7 +86,16 @@ def limits_table(found: list[Margin], anchors: Mapping[str, str]) -> Table:
 
 def demand_table(manifest: Manifest, anchors: Mapping[str, str]) -> Table:
     """What every case asks of every actuator."""
-    names = ("Peak", "At", "Rms", "Peak speed", "Peak power", "Braking power", "Work", "Returned")
+    names = (
+        "Peak force or torque",
+        "At",
+        "Rms force or torque",
+        "Peak speed",
+        "Peak power",
+        "Braking power",
+        "Work",
+        "Returned",
+    )
     rows = []
     models = list(dict.fromkeys(r.demand.mass_model for r in manifest.cases.values() if r.demand.joints))
     for case, record in manifest.cases.items():
@@ -113,7 +122,7 @@ def demand_table(manifest: Manifest, anchors: Mapping[str, str]) -> Table:
         f"What each case asks of each actuator, by the reference with {' and '.join(models)} masses.",
         columns(("Case", "Actuator", *names), names),
         tuple(rows),
-        "Peak and rms are of force or torque; power is force times speed at the joint, its peak driving or braking."
+        "The actuator is named by its joint. Power is force times speed at the joint, its peak driving or braking."
         " “Work” is what the actuator puts in while it drives, “returned” what flows back while it brakes: a drive that"
         " cannot store it burns it.",
     )

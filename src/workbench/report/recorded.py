@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from workbench.report.manifest import CaseRecord
 from workbench.report.tables import Cell, Table, columns
-from workbench.report.text import exact, percent
+from workbench.report.text import exact, percent, torque_name
 
 
 def recorded_tables(record: CaseRecord, anchor: str) -> list[Table]:
@@ -14,10 +14,12 @@ def recorded_tables(record: CaseRecord, anchor: str) -> list[Table]:
     reasons, parts, smoothed = [], [], []
     for label, found in record.recorded.items():
         for joint, one in found.joints.items():
-            reasons.append((Cell(label), Cell(joint), Cell(one.reason)))
+            reasons.append((Cell(label), Cell(torque_name(joint)), Cell(one.reason)))
             for part in one.parts:
                 share = percent(part.share) if part.share is not None else "–"
-                parts.append((Cell(label), Cell(joint), Cell(part.name), Cell(part.text), Cell(share, part.share)))
+                parts.append(
+                    (Cell(label), Cell(torque_name(joint)), Cell(part.name), Cell(part.text), Cell(share, part.share))
+                )
         for joint, motion in found.motion.items():
             smoothed.append(
                 (
@@ -36,14 +38,14 @@ def recorded_tables(record: CaseRecord, anchor: str) -> list[Table]:
         Table(
             f"{anchor}-recorded-reasons",
             "Why the recorded torques are judged as they are.",
-            columns(("Record", "Joint", "Reason")),
+            columns(("Record", "Torque", "Reason")),
             tuple(reasons),
             notes,
         ),
         Table(
             f"{anchor}-recorded-parts",
             "Where the difference lies: parts that stand out of their standard errors, the largest first.",
-            columns(("Record", "Joint", "Part", "Size", "Share"), numeric=("Share",)),
+            columns(("Record", "Torque", "Part", "Size", "Share"), numeric=("Share",)),
             tuple(parts),
             f"{sentences} Sizes with their standard errors; the share is of the difference's sum of squares.",
         ),
@@ -51,7 +53,7 @@ def recorded_tables(record: CaseRecord, anchor: str) -> list[Table]:
             f"{anchor}-recorded-motion",
             "How the recorded coordinates were differentiated.",
             columns(
-                ("Record", "Joint", "Digits", "Noise", "Bandwidth", "Rate to", "Acceleration to"),
+                ("Record", "Coordinate", "Digits", "Noise", "Bandwidth", "Rate to", "Acceleration to"),
                 numeric=("Digits", "Noise", "Bandwidth", "Rate to", "Acceleration to"),
             ),
             tuple(smoothed),

@@ -44,6 +44,11 @@ _REFERENCE = re.compile(r'(url\(#|href="#)([^")]+)')
 _GROUP = re.compile(r"<g(?: [^>]*[^>/])?>\n?|</g>\n?")
 _SVG_TAG = re.compile(r"<svg[^>]*>")
 _PANELS = re.compile(r"data-panels='[^']*'")
+_MARKERS = re.compile(
+    r'<g( clip-path="[^"]*")?>\n((?:<use [^<>]* class="(p\d+)"/>\n)(?:<use [^<>]* class="\3"/>\n)*)</g>'
+)
+_BETWEEN = re.compile(r">\n<(?!/?t)")
+"""Line ends between elements, except about text."""
 _VIEW_BOX = re.compile(r'viewBox="([^"]*)"')
 
 
@@ -152,6 +157,12 @@ def _without_bare_groups(svg: str) -> str:
     return _GROUP.sub(group, svg)
 
 
+def _styled_once(match: re.Match[str]) -> str:
+    """Markers of one curve look alike: their group says how."""
+    uses = match[2].replace(f' class="{match[3]}"', "")
+    return f'<g{match[1] or ""} class="{match[3]}">\n{uses}</g>'
+
+
 class StyleSheet:
     """Gathers the styles of all drawings of a page, so that each is written once; gives identifiers short names."""
 
@@ -167,7 +178,8 @@ class StyleSheet:
             self._identifiers += 1
             for before, after in (('id="', '"'), ("url(#", ")"), ('href="#', '"')):
                 svg = svg.replace(f"{before}{name}{after}", f"{before}s{self._identifiers}{after}")
-        return self._shapes.share(_STYLE.sub(lambda match: f' class="{self._name(match[1])}"', svg))
+        svg = _STYLE.sub(lambda match: f' class="{self._name(match[1])}"', svg)
+        return self._shapes.share(_BETWEEN.sub("><", _MARKERS.sub(_styled_once, svg)))
 
     def _name(self, style: str) -> str:
         return self._names.setdefault(style, f"p{len(self._names)}")

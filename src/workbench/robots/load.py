@@ -119,8 +119,10 @@ def load_model(
     return with_overrides(base, overrides or {})
 
 
-def with_overrides(base: Base, overrides: Mapping[str, float]) -> LoadedModel:
+def with_overrides(base: Base, overrides: Mapping[str, float], *, whole: bool = False) -> LoadedModel:
     """Return what `load_model` gives for a model that has been read, with parameters changed.
+
+    *whole* says that the overrides are all parameters, as `ParameterTable.changed` gave them.
 
     Raises
     ------
@@ -133,8 +135,8 @@ def with_overrides(base: Base, overrides: Mapping[str, float]) -> LoadedModel:
     described, values, file = loaded.description, loaded.values, loaded.file
     if described is None or values is None:
         raise no_parameters(file)
-    wanted = described.table.changed(values, overrides)
-    refuse_computed(base, described.table.expand(overrides), values)
+    wanted = dict(overrides) if whole else described.table.changed(values, overrides)
+    refuse_computed(base, overrides if whole else described.table.expand(overrides), values)
     quickly = base.variants.loaded(base, wanted)
     if quickly is not None:
         return quickly

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from workbench.campaign.cases import Case, base_robot, resolve_case
 from workbench.campaign.compare import CaseResult, Row, compute_case
@@ -47,6 +46,26 @@ class Answer:
     record: Record
     series: bytes | None = None
 
+    def packed(self) -> Packed:
+        """What the process that writes needs of it."""
+        return Packed(self.record.index, self.record.status, self.record.line(), self.series)
+
+
+@dataclass(frozen=True)
+class Packed:
+    """An answer as it travels: the worker makes the journal's line, so that the one process that writes only writes."""
+
+    index: int
+    status: str
+    line: bytes
+    """`Record.line`"""
+    series: bytes | None = None
+
+
+def compute(context: Context, base: Robot, task: Task) -> Packed:
+    """`evaluate`, packed."""
+    return evaluate(context, base, task).packed()
+
 
 @dataclass(frozen=True)
 class Context:
@@ -69,7 +88,7 @@ class Context:
         assert self.campaign.sweep is not None
         return self.campaign.sweep.keep_series
 
-    def setup(self) -> Callable[[Task], Answer]:
+    def setup(self) -> Callable[[Task], Packed]:
         """Check that this process would give the same numbers as the one that asks, and return what computes a task.
 
         Raises
@@ -84,7 +103,7 @@ class Context:
         base = base_robot(self.campaign, self.file, self.model, users)[0]
         with contextlib.suppress(WorkbenchError):
             self._warm_up(base)
-        return partial(evaluate, self, base)
+        return partial(compute, self, base)
 
     def overrides(self, robot: Robot, spec: CaseSpec) -> dict[str, float]:
         """Parameters of a case, over those of the campaign and under those of the command line."""
@@ -144,6 +163,8 @@ def evaluate(context: Context, base: Robot, task: Task) -> Answer:
 
 def series_bytes(result: CaseResult) -> bytes:
     """Return the time series as they stand in ``series/<case>.parquet``; the same numbers give the same bytes."""
+    import pandas as pd  # heavy, and most sweeps keep none
+
     buffer = io.BytesIO()
     pd.DataFrame(dict(result.series)).to_parquet(buffer, index=False, write_page_checksum=True)
     return buffer.getvalue()

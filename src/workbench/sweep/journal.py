@@ -71,7 +71,7 @@ class Journal:
                 if line.endswith(b"\n"):
                     record = parse_line(line)
                     if record is not None and 0 <= record.index < len(self._places):
-                        self._note(record, self._end)
+                        self._note(record.index, record.status, self._end)
                     self._end += len(line)
                 elif len(line) == LONGEST_LINE:
                     self._end += len(line)
@@ -79,19 +79,22 @@ class Journal:
         if os.fstat(self._file.fileno()).st_size > self._end:
             self._file.truncate(self._end)
 
-    def _note(self, record: Record, place: int) -> None:
-        self._places[record.index] = place
-        self._statuses[record.index] = STATUSES.index(record.status)
+    def _note(self, index: int, status: str, place: int) -> None:
+        self._places[index] = place
+        self._statuses[index] = STATUSES.index(status)
 
     def append(self, record: Record) -> None:
-        """Add a finished case; what a full disk leaves of it is taken back.
+        """Add a finished case, as `add`."""
+        self.add(record.index, record.status, record.line())
+
+    def add(self, index: int, status: str, line: bytes) -> None:
+        """Add a finished case by its line (`Record.line`); what a full disk leaves of it is taken back.
 
         Raises
         ------
         OSError
             The system refuses the write.
         """
-        line = record.line()
         try:
             self._file.seek(self._end)
             written = 0
@@ -100,7 +103,7 @@ class Journal:
         except OSError:
             self._file.truncate(self._end)
             raise
-        self._note(record, self._end)
+        self._note(index, status, self._end)
         self._end += len(line)
 
     def sync(self) -> None:

@@ -25,7 +25,7 @@ from workbench.campaign.user_candidates import full_names, load_candidates, with
 from workbench.errors import OutputError, SpecError, WorkbenchError
 from workbench.staging import check_output
 from workbench.sweep import files, state
-from workbench.sweep.evaluate import Answer, Context, Task
+from workbench.sweep.evaluate import Answer, Context, Packed, Task
 from workbench.sweep.identity import case_key, common_key
 from workbench.sweep.inputs import Inputs, inputs_of
 from workbench.sweep.journal import Journal
@@ -77,7 +77,7 @@ class SweepOutcome:
 class Pool(Protocol):
     """What computes tasks: local workers, or a cluster."""
 
-    def run(self, tasks: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Answer | Lost]]:
+    def run(self, tasks: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Packed | Lost]]:
         """Yield each task's number with its answer, in the order they finish."""
 
     def close(self) -> None:
@@ -279,13 +279,13 @@ def _compute(
         pool = make_pool(context, options, plan.count - before)
         for index, found in pool.run(tasks):
             _refuse_changed(inputs, plan, journal, directory)
-            answer = found if isinstance(found, Answer) else _lost(context, plan, index, found)
+            answer = found if isinstance(found, Packed) else _lost(context, plan, index, found)
             if answer.series is not None:
                 path = state.series_path(directory, plan, index)
                 path.parent.mkdir(exist_ok=True)
                 files.write_bytes(path, answer.series)
-            journal.append(answer.record)
-            meter.count(answer.record.status)
+            journal.add(answer.index, answer.status, answer.line)
+            meter.count(answer.status)
             if time.monotonic() - synced > SYNC_EVERY_S:
                 journal.sync()
                 synced = time.monotonic()
@@ -320,9 +320,9 @@ def task_of(plan: Plan, index: int) -> Task:
     return index, plan.numbers(index)
 
 
-def _lost(context: Context, plan: Plan, index: int, found: Lost) -> Answer:
+def _lost(context: Context, plan: Plan, index: int, found: Lost) -> Packed:
     key = case_key(context.common, plan.case_dict(index))
-    return Answer(lost(index, key, found.status, found.reason))
+    return Answer(lost(index, key, found.status, found.reason)).packed()
 
 
 def _manifest(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from workbench.control.claims import NOT_RUN
 from workbench.report.control.curves import RATE, SPEED, curve, is_number
 from workbench.report.control.load import StudyRun
 from workbench.report.plot import Plot
@@ -41,6 +42,10 @@ def _status(verdict: str) -> Status:
     return LOOKS.get(verdict, UNDECIDED)
 
 
+def _varied(verdict: str) -> Cell:
+    return Cell(NOT_RUN) if verdict == NOT_RUN else Cell(status=_status(verdict))
+
+
 def _answer_section(run: StudyRun) -> Section:
     study = run.study
     counts = (
@@ -51,7 +56,7 @@ def _answer_section(run: StudyRun) -> Section:
     if study.claims:
         rows = []
         for claim in study.claims:
-            differing = [name for name, verdict in claim.varied.items() if verdict != claim.verdict]
+            differing = [name for name, verdict in claim.varied.items() if verdict not in (claim.verdict, NOT_RUN)]
             robust = "the same throughout" if not differing else "another verdict with: " + ", ".join(differing)
             rows.append(
                 (
@@ -77,7 +82,7 @@ def _answer_section(run: StudyRun) -> Section:
                 "The same verdicts with step, integrator and gains varied.",
                 columns(("Claim", *names)),
                 tuple(
-                    (Cell(claim.id), *(Cell(status=_status(claim.varied.get(name, ""))) for name in names))
+                    (Cell(claim.id), *(_varied(claim.varied.get(name, NOT_RUN)) for name in names))
                     for claim in study.claims
                 ),
                 "Each column judges all claims again: by runs at half the step, by MuJoCo's route, by one bandwidth.",
@@ -100,7 +105,8 @@ def _over_section(run: StudyRun, over: str, title: str) -> Section | None:
     if not fixed:
         return None
     middle = min(fixed, key=lambda value: abs(math.log(value))) if over == RATE else fixed[len(fixed) // 2]
-    width = _bandwidths(run)[len(_bandwidths(run)) // 2]
+    widths = _bandwidths(run)
+    width = widths[(len(widths) - 1) // 2]
     plots = [plot for case in _cases(run) if (plot := curve(run, over, case, middle, width)) is not None]
     if not plots:
         return None
