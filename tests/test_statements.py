@@ -426,7 +426,7 @@ def test_a_change_of_all_cases_is_compared_once() -> None:
 
 @pytest.mark.parametrize(
     ("before", "after", "warned"),
-    [(0.23, 230.0, "1000 times"), (0.3, 0.01, "1/30 of"), (0.3, 0.4, ""), (2.0, 0.3, "")],
+    [(0.23, 230.0, "1000 times"), (0.3, 0.01, "1/30 of"), (0.3, 0.4, ""), (2.0, 0.3, ""), (1e-3, 1.2e-3, "")],
 )
 def test_edits_warn_of_absurd_sizes_with_a_figure(before: float, after: float, warned: str) -> None:
     result = EditResult(Path("a"), Path("b"), (Edited("a1", "m", before, after),), ())

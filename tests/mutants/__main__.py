@@ -10,6 +10,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -182,13 +183,16 @@ def _reach(files: list[str], place: Path) -> None:
 def _try(planted: Planted, budget: float, files: list[str]) -> tuple[trial.Outcome, int]:
     """Try one fault: with the tests that reach it, or, where test *files* are given, with those."""
     kernel = modules.is_kernel(planted.module)
+    interpreted = kernel and planted.module.startswith("reference/")
+    if files and (failing := _without_fault(tuple(files), interpreted)):
+        return trial.Outcome(trial.BROKEN, f"fails without a fault: {failing}", 0.0), 0
     text = tree.source_of(planted.module)
     with tree.planted(planted.module, planted.mutant.planted(text)):
         if files and kernel and not planted.module.startswith("reference/"):
-            with tree.own_cache() as cache:
-                outcome, tried = trial.trial(files, cache, GIVEN_LIMIT), len(files)
+            with tree.own_cache() as own:
+                outcome, tried = trial.trial(files, own, GIVEN_LIMIT), len(files)
         elif files:
-            outcome, tried = trial.trial(files, tree.CACHE, GIVEN_LIMIT, interpreted=kernel), len(files)
+            outcome, tried = trial.trial(files, tree.CACHE, GIVEN_LIMIT, interpreted=interpreted), len(files)
         else:
             outcome, tried = _try_reaching(planted, INTERPRETED if kernel else REACHED, budget)
         if not kernel or files or outcome.status != trial.SURVIVED:
@@ -196,9 +200,16 @@ def _try(planted: Planted, budget: float, files: list[str]) -> tuple[trial.Outco
         compiled = modules.kernel_tests(planted.module)
         durations = json.loads(REACHED.read_text(encoding="utf-8"))["durations"]
         limit = COMPILING + int(3 * sum(time for test, time in durations.items() if test.split("::")[0] in compiled))
-        with tree.own_cache() as cache:
-            second = trial.trial(compiled, cache, limit)
+        with tree.own_cache() as own:
+            second = trial.trial(compiled, own, limit)
         return trial.Outcome(second.status, second.by, outcome.seconds + second.seconds), tried + len(compiled)
+
+
+@cache
+def _without_fault(files: tuple[str, ...], interpreted: bool) -> str:
+    """The first of these tests that fails on the package as it is, uncompiled or not; empty where all pass."""
+    outcome = trial.trial(files, tree.CACHE, GIVEN_LIMIT, interpreted=interpreted)
+    return "" if outcome.status == trial.SURVIVED else outcome.by or outcome.status
 
 
 def _try_reaching(planted: Planted, place: Path, budget: float) -> tuple[trial.Outcome, int]:
@@ -251,8 +262,8 @@ def _summary(chosen: list[Planted], known: dict[str, dict[str, object]]) -> int:
         states = [known[planted.key]["status"] for planted in chosen if planted.group == group]
         alive = states.count(trial.SURVIVED)
         survivors += alive
-        killed = len(states) - alive - states.count(trial.BROKEN)
-        print(f"{group}: {killed} of {len(states)} noticed")
+        untried = states.count(trial.BROKEN)
+        print(f"{group}: {len(states) - alive - untried} of {len(states) - untried} noticed, {untried} not tried")
     for planted in chosen:
         if known[planted.key]["status"] == trial.SURVIVED:
             print(f"survived: {planted.group}  {planted.module}:{planted.mutant.line}  {planted.mutant.said()}")
