@@ -32,6 +32,7 @@ def test_ten_thousand_scattered_samples_are_on_the_branch_of_the_closed_form(nam
     still = np.zeros_like(q)
     seen = reference.inverse_dynamics(q, still, still, near=found.qpos[reached]).x
     assert np.abs(seen - mech.forward_kinematics(q)).max() <= 1e-10
-    # the other branch is far from this one, so there was something to see
-    apart = np.abs(mech.assembly_solutions(q) - seen[:, None, :]).max(axis=2).max(axis=1)
-    assert apart.min() > 1e-3
+    apart = np.abs(mech.assembly_solutions(q) - seen[:, None, :]).max(axis=2)
+    assert np.nanmin(apart, axis=1).max() <= 1e-10
+    if apart.shape[1] > 1:  # all assemblies in closed form: another one was there to land on, far from this one
+        assert np.nanmax(apart, axis=1).min() > 1e-2
