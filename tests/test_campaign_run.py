@@ -14,6 +14,7 @@ import pytest
 from rich.console import Console
 
 import workbench as wb
+from exact_csv import read_exact
 from small_campaign import CANDIDATES, HEAD, SMALL, Workbench, listing
 from workbench import console
 from workbench.campaign import store
@@ -53,7 +54,7 @@ def manifest(workbench: Workbench, run: str = "reports/small") -> dict[str, Any]
 
 
 def summary(workbench: Workbench, run: str = "reports/small") -> pd.DataFrame:
-    return pd.read_csv(workbench.directory / run / "summary.csv", float_precision="round_trip")
+    return read_exact(workbench.directory / run / "summary.csv")
 
 
 def series(workbench: Workbench, case: str, run: str = "reports/small") -> pd.DataFrame:

@@ -17,10 +17,10 @@ from workbench.campaign.control_spec import BUILT_IN, ControlClaim, ControlSpec,
 from workbench.campaign.run import run_campaign
 from workbench.campaign.spec import load_campaign
 from workbench.commands.studies import refuse_options
-from workbench.control.claims import HOLDS, NOT_RUN, REFUTED, UNDECIDED, Known, judged
+from workbench.control.claims import HOLDS, REFUTED, UNDECIDED, Known, judged
 from workbench.control.evaluate import Study, compute, evaluate
-from workbench.control.files import ERROR_COLUMNS, LOOP_COLUMNS
 from workbench.control.loop import TRACKED, UNSTABLE
+from workbench.control.names import ERROR_COLUMNS, LOOP_COLUMNS, NOT_RUN
 from workbench.control.plan import Loop, StudyPlan, plan_study
 from workbench.control.run import run_study
 from workbench.control.sampling import Encoder, Sampling

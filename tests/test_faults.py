@@ -120,7 +120,7 @@ def test_workers_die_with_their_parent_even_in_the_middle_of_a_case() -> None:
         "from workbench.sweep.supervisor import Supervisor\n"
         "pool = Supervisor(2, sweep_tasks.echo_setup, 600.0, 400.0, 1)\n"
         "def tell():\n"
-        "    while sum(w.task is not None for w in pool._workers) < 2: time.sleep(0.01)\n"
+        "    while sum(len(w.tasks) for w in pool._workers) < 2: time.sleep(0.01)\n"
         "    print(*pool.pids, flush=True)\n"
         "threading.Thread(target=tell, daemon=True).start()\n"
         "list(pool.run(((i, ('hang', 0.0)) for i in itertools.count())))\n"

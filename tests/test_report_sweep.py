@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 import workbench as wb
+from exact_csv import read_exact
 from small_campaign import Workbench
 from sweep_campaign import SWEEP
 from sweep_store import KEYS, STATUSES, make_sweep
@@ -387,11 +388,7 @@ def test_a_sweep_ends_with_its_report_and_one_design_can_be_run_alone(workbench:
     assert f"--only {worst}" in (many / "report.md").read_text(encoding="utf-8")
     alone = workbench.run(FEW, "--quick", "--only", worst, "--out", "one")
     assert alone.code == 0
-    one = (
-        pd.read_csv(workbench.directory / "one" / "summary.csv", float_precision="round_trip")
-        .set_index(["candidate", "joint"])
-        .peak_error
-    )
+    one = read_exact(workbench.directory / "one" / "summary.csv").set_index(["candidate", "joint"]).peak_error
     same = rows[rows.case == worst].set_index(["candidate", "joint"]).peak_error
     pd.testing.assert_series_equal(one[same.index], same, check_exact=True)
     other = rows[rows.case != worst].groupby("case").get_group(rows.case[rows.case != worst].iloc[0])

@@ -20,6 +20,7 @@ import pandas as pd
 import pytest
 
 import workbench as wb
+from exact_csv import read_exact
 from small_campaign import SMALL, Workbench, listing
 from sweep_campaign import SWEEP
 from workbench.campaign.lock import holder, lock_path, locked
@@ -605,7 +606,7 @@ def test_one_case_of_a_sweep_by_itself_has_the_same_numbers_and_all_evidence(wor
     done = workbench("run", name, "--only", case)
     assert done.code == 0, done
     directory = workbench.directory / "reports" / "sweep-cases"
-    alone = pd.read_csv(directory / "summary.csv", float_precision="round_trip")
+    alone = read_exact(directory / "summary.csv")
     alone = alone[alone["kind"] != "contrast"]
     expected = errors[errors["case"] == case]
     assert len(expected) == len(alone) == 6

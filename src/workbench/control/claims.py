@@ -13,12 +13,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from workbench.campaign.control_spec import PRINTED_COST, ControlClaim, ControlSpec
+from workbench.control.names import NOT_RUN
 from workbench.control.plan import Loop
 
 HOLDS, REFUTED, UNDECIDED = "holds", "does not hold", "cannot be decided"
-
-NOT_RUN = "not run"
-"""Nothing was computed that way, as half the step at high rates."""
 
 ROUTES = ("rms", "rms_halved", "rms_second")
 """Columns of the platform's error: the plant's step, half of it, MuJoCo's route."""

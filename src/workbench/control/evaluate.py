@@ -22,6 +22,7 @@ from workbench.control.controllers import Gains, Law, law_of
 from workbench.control.figures import Error, error_of, extrapolated
 from workbench.control.loop import TRACKED, Tracked, run_loop
 from workbench.control.models import FormulaModel
+from workbench.control.names import NOT_RUN
 from workbench.control.plan import Loop, StudyPlan, case_at, delay_of, overrides_of, plan_study, torque_limits
 from workbench.control.sampling import Desired, Sampling, as_measured, desired_at_ticks
 from workbench.control.user_controller import UserController, load_controllers
@@ -39,8 +40,6 @@ LONGEST_STEP = 1e-3
 HALVED_TO = 2000.0
 """Hz: up to this rate a run is made again at half the plant's step. Beyond, the step is shorter than 0.5 ms, where a
 half changes errors by less than a millionth (measured), and MuJoCo's route alone vouches for them."""
-
-NOT_RUN = "not run"
 
 LISTS = ("controllers", "models", "rates", "highest_rate", "bandwidths", "speeds")
 """What a study is a product of: a run knows its own, and a study that grows keeps what it has."""

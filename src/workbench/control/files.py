@@ -10,16 +10,13 @@ from pathlib import Path
 import pandas as pd
 
 from workbench.campaign import store
+from workbench.control.names import CONTROL, ERROR_COLUMNS, ERRORS, LOOP_COLUMNS, RUNS
 from workbench.control.plan import Loop
 from workbench.staging import DirectoryKind
 from workbench.sweep import files
 from workbench.sweep.journal import NAME as JOURNAL
 from workbench.sweep.journal import Journal
 from workbench.sweep.record import Record
-
-CONTROL = "control.json"
-RUNS = "runs.parquet"
-ERRORS = "errors.parquet"
 
 FINISHED = (files.STATE, CONTROL, RUNS, ERRORS, JOURNAL, store.MANIFEST, *store.REPORTS)
 RUN = DirectoryKind(
@@ -28,12 +25,6 @@ RUN = DirectoryKind(
     keys=frozenset({"format", "campaign", "versions"}),
     members=(*FINISHED, files.PROGRESS, *(f".{name}.part" for name in FINISHED), f".{files.PROGRESS}.part"),
 )
-
-LOOP_COLUMNS = ("case", "controller", "model", "speed", "rate", "rate_asked", "bandwidth")
-ERROR_COLUMNS = (
-    "joint", "rms", "peak", "rms_halved", "rms_second", "effort", "largest", "saturated",
-)  # fmt: skip
-"""What a row of a run holds; see docs/control.md."""
 
 
 def write_tables(directory: Path, loops: Sequence[Loop], records: Sequence[Record]) -> None:

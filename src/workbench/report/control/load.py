@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import Field
 
-from workbench.control.files import CONTROL, ERROR_COLUMNS, ERRORS, LOOP_COLUMNS, RUNS
+from workbench.control.names import CONTROL, ERROR_COLUMNS, ERRORS, LOOP_COLUMNS, RUNS
 from workbench.errors import OutputError
 from workbench.parquet_columns import read_columns
 from workbench.records import Record, read_record

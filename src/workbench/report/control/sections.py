@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from workbench.control.claims import NOT_RUN
+from workbench.control.names import NOT_RUN
 from workbench.report.control.curves import RATE, SPEED, curve, is_number
 from workbench.report.control.load import StudyRun
 from workbench.report.plot import Plot
