@@ -1,0 +1,16 @@
+"""What a study's files and columns are called: all of them that a report has to know, and nothing that computes."""
+
+from __future__ import annotations
+
+CONTROL = "control.json"
+RUNS = "runs.parquet"
+ERRORS = "errors.parquet"
+
+LOOP_COLUMNS = ("case", "controller", "model", "speed", "rate", "rate_asked", "bandwidth")
+ERROR_COLUMNS = (
+    "joint", "rms", "peak", "rms_halved", "rms_second", "effort", "largest", "saturated",
+)  # fmt: skip
+"""What a row of a run holds; see docs/control.md."""
+
+NOT_RUN = "not run"
+"""In place of a verdict or a status: nobody computed it."""
