@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +17,22 @@ FLAGS = (
 
 
 @pytest.fixture(scope="session")
-def chromium() -> Iterator[Any]:
-    """A browser without windows."""
+def launch() -> Iterator[Callable[[Sequence[str]], Any]]:
+    """Starts a browser with flags; one driver for all of them, since a second one cannot be had in a process."""
     api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install '.[dev]'")
     path = next((found for name in NAMES if (found := shutil.which(name))), None)
     if path is None:
         pytest.skip(f"no Chromium on this machine; looked for {', '.join(NAMES)} (apt-get install chromium)")
     with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
-        yield browser
-        browser.close()
+        yield lambda flags: playwright.chromium.launch(executable_path=path, args=list(flags))
+
+
+@pytest.fixture(scope="session")
+def chromium(launch: Callable[[Sequence[str]], Any]) -> Iterator[Any]:
+    """A browser without windows."""
+    browser = launch(FLAGS)
+    yield browser
+    browser.close()
 
 
 @pytest.fixture(scope="session")
