@@ -457,7 +457,7 @@ def test_sources_compiled_statement_by_statement_are_the_same() -> None:
 @pytest.mark.parametrize(
     "mistakes",
     [
-        {"centre = elbow - p.r": "centre = elbow + p.r", "x = centre[:, 0] + middle": "x = centre[:, 0] - middle"},
+        {"(p.R - p.r + p.a * cos)": "(p.R + p.r + p.a * cos)", "centre[:, 0] + middle -": "centre[:, 0] - middle -"},
         {"p.Ia + p.ma * p.a**2 / 4": "p.Ia - p.ma * p.a**2 / 4", "cross * elbow + (far": "cross * elbow - (far"},
     ],
     ids=["each spoils everything", "in parts of their own"],
