@@ -120,7 +120,7 @@ def wait_for(page: Any, text: str) -> None:
     page.wait_for_selector(f"text={text}")
 
 
-@pytest.mark.browser
+@pytest.mark.long
 def test_the_papers_robot_is_moved_by_mouse_keyboard_and_number(browser: Any, tmp_path: Path) -> None:
     """One page from opening to keeping, since a page takes long to open here."""
     model = tmp_path / "asym_2rss_ppap.xml"
@@ -183,7 +183,7 @@ def test_the_papers_robot_is_moved_by_mouse_keyboard_and_number(browser: Any, tm
         page.wait_for_selector("text=Shown is the last state that works", state="detached")
 
 
-@pytest.mark.browser
+@pytest.mark.long
 def test_a_narrow_dark_window_has_room_for_the_scene(browser: Any) -> None:
     session = Session(open_subject("asym_2rss_ppap"), "pick_and_place")
     with served(session, dark=True) as url, opened(browser, url, 700) as (page, _):
