@@ -22,6 +22,7 @@ from workbench.control import files as study_files
 from workbench.control.claims import HOLDS, Known, Verdict, judged
 from workbench.control.evaluate import StudyContext, study_key
 from workbench.control.figures import is_decided
+from workbench.control.names import CONTROL
 from workbench.control.plan import StudyPlan, plan_study, torque_limits
 from workbench.control.user_controller import load_controllers
 from workbench.errors import OutputError
@@ -111,7 +112,7 @@ def run_study(
                 "engines": ["mujoco"],
                 "budget": plan.spec.second_route == "all",
             }
-            files.write_json(directory / study_files.CONTROL, summary)
+            files.write_json(directory / CONTROL, summary)
             files.write_json(directory / store.MANIFEST, manifest)
             (directory / files.PROGRESS).unlink(missing_ok=True)
             if report:
@@ -125,7 +126,7 @@ def run_study(
 
 
 def _prepare(directory: Path, name: str, request: Mapping[str, Any], options: SweepOptions) -> None:
-    if (directory / store.MANIFEST).exists() and not (directory / study_files.CONTROL).exists():
+    if (directory / store.MANIFEST).exists() and not (directory / CONTROL).exists():
         raise OutputError(
             f"{directory}: holds a run of another kind; --out names another directory", path=str(directory)
         )
