@@ -20,6 +20,9 @@ FLOORS_TESTS ?= $(patsubst %,tests/test_%.py,campaign_run campaign_spec case_fig
 # Campaigns whose reports are kept in reports/published.
 PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models design_sweep
 
+# Installs the package: environment, constraints, extra.
+install = $(if $(UV),"$(UV)" pip install --quiet --python $(1)/bin/python,$(1)/bin/python -m pip install --quiet --disable-pip-version-check) --constraint $(2) --editable '.[$(3)]'
+
 # What an interpreter must offer: uv brings its own installer, pip comes from the interpreter's ensurepip.
 SUITABLE := import sys, $(if $(UV),os,ensurepip, venv); sys.exit(sys.version_info < (3, 11))
 
@@ -48,11 +51,7 @@ $(STAMP): pyproject.toml constraints.txt
 	  fi; \
 	fi
 	@echo "setting up $(VENV) ($(if $(UV),uv,pip))"
-ifneq ($(UV),)
-	@"$(UV)" pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[dev]'
-else
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
-endif
+	@$(call install,$(VENV),constraints.txt,dev)
 	@touch $@
 
 run: $(STAMP) ## Run the campaign of the 2010 paper (CAMPAIGN=... for another)
@@ -76,11 +75,7 @@ test-browser: $(STAMP) ## Run the tests that open a report in Chromium
 test-floors: $(STAMP) ## Run the tests with the lowest versions of all dependencies
 	@mkdir -p build && $(BIN)/python tests/floors.py > build/floors.txt
 	@if [ ! -d $(VENV)-floors ]; then $(BIN)/python -m venv $(VENV)-floors; fi
-ifneq ($(UV),)
-	@"$(UV)" pip install --quiet --python $(VENV)-floors/bin/python --constraint build/floors.txt --editable '.[dev]'
-else
-	@$(VENV)-floors/bin/python -m pip install --quiet --disable-pip-version-check --constraint build/floors.txt --editable '.[dev]'
-endif
+	@$(call install,$(VENV)-floors,build/floors.txt,dev)
 	NUMBA_CACHE_DIR=$(abspath build/floors-kernels) $(VENV)-floors/bin/pytest -n 2 --dist worksteal -W ignore::DeprecationWarning $(FLOORS_TESTS) $(PYTEST_ARGS)
 
 # Hours where CPU is scarce; what was tried is kept in build/mutants, so that it can be stopped and gone on with.
@@ -107,11 +102,7 @@ reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings i
 
 $(DOCS_STAMP): $(STAMP)
 	@echo "setting up $(VENV) for the documentation"
-ifneq ($(UV),)
-	@"$(UV)" pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[docs]'
-else
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
-endif
+	@$(call install,$(VENV),constraints.txt,docs)
 	@touch $@
 
 docs: $(DOCS_STAMP) ## Build the documentation site into build/site/html; warnings and dead links are errors

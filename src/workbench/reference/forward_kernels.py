@@ -18,6 +18,7 @@ from workbench.compiled import compiled, merged
 from workbench.reference.closing import Mechanism, _copy, _copy_rows, _on_side, close_one
 from workbench.reference.kernels import follow_tangent, integrate
 from workbench.reference.kinematics import FLOATING, TURNING, _turned
+from workbench.reference.linear import solve
 from workbench.reference.rows import acceleration_rows, point_motion
 
 DONE, OPEN, LOST = 0, 1, 2
@@ -99,27 +100,6 @@ def room_for(mechanism: Mechanism) -> Room:
         np.zeros(nv), np.zeros(p), np.zeros(m), np.zeros((nb, 6)), np.zeros((nb, 6)),
         np.zeros((nb, 6, na)), np.zeros((5, na)), np.zeros(3), np.zeros((na, na)), np.zeros((6, na)),
     )  # fmt: skip
-
-
-@merged
-def _least_squares(a, beta, order, rank, rhs, x):  # type: ignore[no-untyped-def]
-    """Solve by the factor in the first columns of *a*; *rhs* ``(m,)`` is overwritten."""
-    m, p = rhs.shape[0], order.shape[0]
-    for k in range(rank):
-        s = rhs[k]
-        for i in range(k + 1, m):
-            s += a[i, k] * rhs[i]
-        s *= beta[k]
-        rhs[k] -= s
-        for i in range(k + 1, m):
-            rhs[i] -= s * a[i, k]
-    for j in range(p):
-        x[j] = 0.0
-    for k in range(rank - 1, -1, -1):
-        s = rhs[k]
-        for j in range(k + 1, rank):
-            s -= a[k, j] * x[order[j]]
-        x[order[k]] = s / a[k, k]
 
 
 @compiled
@@ -228,7 +208,7 @@ def _evaluate(mechanism, masses, w, r, qpos, tangent, velocity):  # type: ignore
         )  # fmt: skip
         for i in range(r.rates.shape[0]):
             r.rates[i] = -r.rates[i]
-        _least_squares(w.a, w.beta, w.order, np.int64(w.facts[1]), r.rates, r.x)
+        solve(w.a, w.beta, w.order, np.int64(w.facts[1]), r.rates, r.x)
         for j in range(passive.shape[0]):
             r.carried[passive[j]] = r.x[j]
         _motions(kin, w.places.cdof, r.qvel, r.carried, tangent, r.v, r.a, r.per_rate)

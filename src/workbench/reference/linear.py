@@ -111,8 +111,11 @@ def solved(a, perm, rank, column, x):  # type: ignore[no-untyped-def]
 
 @compiled
 def solve(a, beta, perm, rank, rhs, x):  # type: ignore[no-untyped-def]
-    """Least squares ``min |A x - rhs|``; returns the residual norm. ``rhs (m,)`` is overwritten by Q^T rhs."""
-    m, p = a.shape
+    """Least squares ``min |A x - rhs|``; returns the residual norm. ``rhs (m,)`` is overwritten by Q^T rhs.
+
+    The factor stands in the first columns of *a*; further ones, factored along, are not looked at.
+    """
+    m, p = rhs.shape[0], perm.shape[0]
     for k in range(rank):
         s = rhs[k]
         for i in range(k + 1, m):
