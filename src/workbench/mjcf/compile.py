@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import warnings
-from collections.abc import Iterator
 from pathlib import Path
 
 import mujoco
@@ -13,6 +11,7 @@ import numpy as np
 from workbench.data_files import bundled
 from workbench.errors import ModelError, WorkbenchError
 from workbench.limits import LARGEST_NUMBER
+from workbench.mjcf.engine_warnings import engine_warnings
 
 FINITE = (
     "qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
@@ -45,23 +44,6 @@ def find_model(path: str | Path) -> Path:
         with contextlib.suppress(WorkbenchError):  # the message below says it better
             return bundled("models", path.name)
     raise ModelError(f"{path}: no such model file", file=str(path))
-
-
-@contextlib.contextmanager
-def engine_warnings() -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings; left alone it prints them and writes a log file into the current directory.
-
-    Those of a specification's own ``compile`` come as Python's UserWarning, and are dropped.
-    """
-    collected: list[str] = []
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(collected.append)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            yield collected
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def compile_spec(spec: mujoco.MjSpec, file: str) -> mujoco.MjModel:

@@ -20,7 +20,7 @@ from mujoco.batch import Batch
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, ParameterError
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.engine_warnings import engine_warnings
 from workbench.reference.frames import Frames, place_frames
 from workbench.reference.shelf import Shelf
 
