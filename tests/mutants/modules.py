@@ -20,7 +20,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
 CORE_TESTS = (
     "agreement", "asym_kernel", "asym_literal", "asym_mobility", "body_numbers", "campaign_run", "campaign_spec",
     "case_figures", "closure_kinds", "compare_case", "counted_forces", "errata", "friction", "fuzz_mechanisms",
-    "engine_warnings", "hints", "idle_rods", "importing", "malformed_mechanisms", "mass_models", "metrics", "mjcf_assumptions", "mjcf_edit", "mjcf_roundtrip",
+    "engine_warnings", "hints", "idle_rods", "importing", "malformed_mechanisms", "mass_models", "metrics",
+    "mjcf_assumptions", "mjcf_edit", "mjcf_roundtrip",
     "mjcf_safety", "mjcf_setup", "mjcf_source", "model_command", "models", "motion_along", "motion_platform",
     "negative_controls", "own_campaign", "own_reference", "pinocchio_reference", "planar_4rprp", "planar_4rprp_model",
     "platform_side", "random_robots", "reactions", "recorded", "reference_closure", "reference_dynamics",
