@@ -70,7 +70,7 @@ class Tracked:
     """J, of the actuators; exact for torques that are held"""
 
 
-def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, step: float) -> Tracked:
+def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, step: float, times: int = 1) -> Tracked:
     """Track a motion, beginning on it; before the first torque arrives the actuators give the same one.
 
     Parameters
@@ -85,6 +85,8 @@ def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, ste
         Delay, encoder, limits.
     step
         s, the longest step in time of the plant.
+    times
+        So many steps in place of each: 2 halves them all.
     """
     count, na = desired.q.shape
     period = sampling.period
@@ -92,7 +94,7 @@ def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, ste
     rest = sampling.delay - whole * period
     rest = 0.0 if rest < TICK * period else rest
     pieces = [piece for piece in (rest, period - rest) if piece > 0.0]
-    steps = [max(1, math.ceil(piece / step - TICK)) for piece in pieces]
+    steps = [times * max(1, math.ceil(piece / step - TICK)) for piece in pieces]
     scale = LOST * np.maximum(desired.stroke, SMALLEST_STROKE)
     plant.begin(desired.q[0], desired.qd[0])
     encoder = Encoder(sampling, desired.qd[0])
