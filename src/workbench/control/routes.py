@@ -74,7 +74,7 @@ def by_routes(
     own = error(tracked.q, tracked.x) if tracked.status == TRACKED else None
     halved = None
     if own and 1.0 / period <= HALVED_TO * (1.0 + 1e-9):
-        half = run(plant, own_step, 2)
+        half = run(plant, 0.5 * own_step, 1)
         halved = error(half.q, half.x) if half.status == TRACKED else None
     if stiff is None:
         return Outcome(tracked, own, halved, None, NOT_RUN, math.nan)
@@ -99,7 +99,8 @@ def _second(
     if explicit and own and first and abs(first.platform_rms - own.platform_rms) <= AGREED * own.platform_rms:
         return first, TRACKED, math.nan
     stiff.stiffen(0.5 * step, explicit)
-    fine = run(stiff, step, 2)
+    # extrapolation of a first order asks for exactly half of every step; of order four the longest ones alone count
+    fine = run(stiff, 0.5 * step, 1) if explicit else run(stiff, step, 2)
     if own is None or fine.status != TRACKED or not (explicit or first):
         return None, fine.status if first or explicit else coarse.status, math.nan
     found = error(fine.q, fine.x)

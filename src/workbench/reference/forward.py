@@ -16,18 +16,7 @@ from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
 from workbench.reference.body_forces import felt_gravity
 from workbench.reference.closing import bench
-from workbench.reference.forward_kernels import (
-    CLASSICAL,
-    DONE,
-    MIDPOINT,
-    OPEN,
-    STAND,
-    Masses,
-    accelerations,
-    hold,
-    move,
-    room_for,
-)
+from workbench.reference.forward_kernels import DONE, OPEN, Masses, accelerations, hold, move, room_for
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.reference.sides import UNKNOWN
 
@@ -43,10 +32,6 @@ REACH = 0.02
 SOFT_SPEED = 1e-2
 """rad/s or m/s: dry friction grows to its full size over so much speed, F tanh(v / soft). A sharper step needs shorter
 steps in time; a joint at rest creeps by up to so much a second in place of sticking."""
-
-SHORT = 2e-4
-"""s: steps up to this length are taken by the midpoint rule. They are what is left of a period before a late torque
-arrives, and their error is of the third power of so short a time."""
 
 
 class Plant:
@@ -133,7 +118,7 @@ class Plant:
         bench, room = self._bench, self._room
         room.q[:], room.qd[:], room.carried_here[:] = q, qd, 0.0
         bench.here[:], bench.tangent_here[:], bench.sides[:] = qpos, 0.0, UNKNOWN
-        if move(self._held, np.zeros(len(room.q)), 0.0, 1, STAND) != DONE:
+        if move(self._held, np.zeros(len(room.q)), 0.0, 1, True) != DONE:
             raise MotionError(
                 "control: the loops cannot be closed where the motion begins", value=np.asarray(q).tolist()
             )
@@ -143,9 +128,9 @@ class Plant:
 
         Unless it is `DONE`, the state is that of the last step that was.
         """
-        if not math.isfinite(float(tau.sum())):
+        if not all(map(math.isfinite, tau.tolist())):
             raise ValueError("torques have to be finite")
-        return int(move(self._held, tau, duration, steps, MIDPOINT if duration <= SHORT * steps else CLASSICAL))
+        return int(move(self._held, tau, duration, steps, False))
 
     def acceleration(self, tau: FloatArray) -> FloatArray:
         """Accelerations ``(na,)`` under torques, now."""

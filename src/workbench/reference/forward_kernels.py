@@ -28,9 +28,6 @@ with shielded():
 DONE, OPEN, LOST = 0, 1, 2
 """How a stretch of time ended: at its end, where the loops cannot be closed on the branch, where numbers are lost."""
 
-STAND, CLASSICAL, MIDPOINT = 0, 4, 2
-"""What `move` does: close and evaluate where it stands, or a method of this order in time."""
-
 
 class Masses(NamedTuple):
     """What moves and what acts on it; SI, world frame where no other is named."""
@@ -101,7 +98,7 @@ class Room(NamedTuple):
 
 
 @structref.register
-class HeldType(types.StructRef):  # type: ignore[misc,name-defined]
+class HeldType(types.StructRef):  # type: ignore[misc]
     """To the compiler, a plant's arrays held together."""
 
 
@@ -356,24 +353,21 @@ def _stage(r, stage, h):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def move(held, tau, duration, steps, how):  # type: ignore[no-untyped-def]
-    """Move on by *duration* under constant torques ``(na,)``, in equal steps.
+def move(held, tau, duration, steps, stand):  # type: ignore[no-untyped-def]
+    """Move on by *duration* under constant torques ``(na,)``, in equal steps of Nystrom's classical method, order four.
 
-    `CLASSICAL`: Nystrom's method of order four; its second and third stage share their coordinates, so a step closes
-    the loops three times and evaluates four. `MIDPOINT`: of order two, two of each, for what is short. `STAND`: time
-    does not move on, and the state that the room and ``Bench.here`` hold is closed and evaluated. One kernel for all,
-    and each call in it once, since handing so many arrays over takes seconds to compile.
+    The second and third stage share their coordinates, so a step closes the loops three times. With *stand* time does
+    not move on: the state that the room and ``Bench.here`` hold is closed and evaluated. One kernel for both, and each
+    call in it once, since handing so many arrays over takes seconds to compile.
     """
     mechanism, rules, masses, w, r = held.mechanism, held.rules, held.masses, held.bench, held.room
-    na, h = tau.shape[0], 0.0 if how == STAND else duration / steps
+    na, h = tau.shape[0], 0.0 if stand else duration / steps
     q, v = r.stages[3], r.stages[4]
     for _ in range(steps):
-        if how != STAND and not accelerations(r, tau, r.stages[0]):
+        if not stand and not accelerations(r, tau, r.stages[0]):
             return LOST
-        for stage in range(4 if how == STAND else 1, 5):
-            if how == MIDPOINT and stage in (2, 3):
-                continue
-            if how == STAND:
+        for stage in range(4 if stand else 1, 5):
+            if stand:
                 for j in range(na):
                     r.qdd[j] = r.stages[0, j] = r.stages[1, j] = r.stages[2, j] = 0.0
             _stage(r, stage, h)
@@ -392,7 +386,4 @@ def move(held, tau, duration, steps, how):  # type: ignore[no-untyped-def]
                 _copy(r.carried, r.carried_here)
             elif not accelerations(r, tau, r.qdd if stage == 3 else r.stages[stage]):
                 return LOST
-            if how == MIDPOINT and stage == 1:
-                for j in range(na):  # the last stage's weights sum up to those of the one in the middle
-                    r.qdd[j] = r.stages[0, j] = r.stages[2, j] = r.stages[1, j]
     return DONE
