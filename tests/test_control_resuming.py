@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -224,3 +225,20 @@ def test_an_edited_neighbour_of_a_controller_makes_runs_anew(bench: Workbench) -
         errors.append(pd.read_parquet(bench.directory / "out" / "errors.parquet")["rms"].to_numpy())
     assert (errors[0] == errors[1]).all()
     assert (errors[0] != errors[2]).all()
+
+
+@pytest.mark.slow
+def test_a_study_on_a_cluster_gives_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+    bench = Workbench(tmp_path, monkeypatch, capsys)
+    assert bench.run(STUDY, "--out", "here", "--jobs", "1").code == 0
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path for path in sys.path if path))
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        done = bench.run(STUDY, "--out", "there", "--scheduler", cluster.scheduler_address)
+    assert done.code == 0, done.err
+    for name in ("runs.parquet", "errors.parquet", "control.json", "journal.jsonl"):
+        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
