@@ -67,4 +67,6 @@ def as_vector(what: str, value: Any, unit: str, length: int | None = None) -> li
     if not entries or (length is not None and len(entries) != length):
         allowed = "one or more" if length is None else length
         raise MotionError(f"{what} has {len(entries)} entries; allowed: {allowed}", value=len(entries))
+    if all(type(entry) is float and math.isfinite(entry) for entry in entries):
+        return entries
     return [as_number(f"{what}, entry {number}", entry, unit) for number, entry in enumerate(entries, start=1)]
