@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,11 @@ class Case:
     def name(self) -> str:
         """The case's name, which is also its file's."""
         return self.spec.name
+
+    @cached_property
+    def singularity(self) -> dict[str, FloatArray]:
+        """`Robot.singularity_measures` along the motion."""
+        return self.robot.singularity_measures(self.motion.q)
 
 
 def resolve_cases(
