@@ -17,7 +17,7 @@ from workbench.control.estimate import estimate_study
 from workbench.control.plan import pairs_of
 from workbench.control.run import StudyOutcome, run_study
 from workbench.errors import SpecError
-from workbench.sweep.run import SweepOptions
+from workbench.sweep.resumable import SweepOptions
 
 PLURALS = {"controller with its model": "controllers with their models"}
 
