@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import xml.parsers.expat as expat
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
@@ -134,29 +135,29 @@ def _located(
     text: str, raw: bytes, found: list[tuple[str, str, str, str, int, int]], ends: dict[int, int], file: str
 ) -> Elements:
     """Turn byte offsets into places in the text."""
-    places = _places(text, raw, sorted({offset for *_, offset, _ in found} | set(ends.values())))
+    at = _places(text, raw, sorted({offset for *_, offset, _ in found} | set(ends.values())))
     elements = Elements()
     for number, (tag, name, body, section, offset, line) in enumerate(found):
-        start, close = places[offset], places[ends[number]]
+        start, close = at(offset), at(ends[number])
         match = TAG.match(text, start)
         if match is None:  # expat accepted it, so this is a form of tag that no MJCF uses
             raise ModelError(f"{file}:{line}: cannot read the tag <{tag}>", file=file)
-        alone = match.group().endswith("/>")
-        close, stop = (match.end(),) * 2 if alone else (close, text.index(">", close) + 1)
-        elements.append(Element(tag, name, body, section, start, match.end(), line, close, stop))
+        end = match.end()
+        close, stop = (end, end) if text[end - 2] == "/" else (close, text.index(">", close) + 1)
+        elements.append(Element(tag, name, body, section, start, end, line, close, stop))
     return elements
 
 
-def _places(text: str, raw: bytes, offsets: list[int]) -> dict[int, int]:
+def _places(text: str, raw: bytes, offsets: list[int]) -> Callable[[int], int]:
     """Places in the text of sorted byte offsets."""
     if len(text) == len(raw):
-        return {offset: offset for offset in offsets}
+        return int
     places, place, before = {}, 0, 0
     for offset in offsets:
         place += len(raw[before:offset].decode())
         before = offset
         places[offset] = place
-    return places
+    return places.__getitem__
 
 
 def find(elements: list[Element], tag: str, name: str) -> Element | None:
@@ -207,6 +208,8 @@ def _called(element: Element) -> str:
 
 def attribute_span(text: str, element: Element, attribute: str) -> tuple[int, int] | None:
     """Where the value of an attribute lies in the text, without its quotes; None where it is missing."""
+    if text.find(attribute, element.start, element.end) < 0:
+        return None
     for match in ATTRIBUTE.finditer(text, element.start, element.end):
         if match.group(1) == attribute:
             return match.span(2 if match.group(2) is not None else 3)

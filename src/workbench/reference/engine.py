@@ -127,13 +127,25 @@ POSES = ("cdof", "subtree_com", "site_xpos", "site_xquat", "xanchor")
 DYNAMICS = ("cdof_dot", "M", "qfrc_bias", "qfrc_passive", "xipos", "energy")
 
 
+class ShapedBatch(Batch):  # type: ignore[misc]  # mujoco.batch comes without types
+    """A batch that is told the shapes of MuJoCo's arrays: its own way to them takes longer than a short batch."""
+
+    def __init__(self, model: mujoco.MjModel, room: int, shapes: mujoco.MjData) -> None:
+        self._shapes = shapes
+        super().__init__(model, room, 1)
+
+    @property
+    def _data(self) -> mujoco.MjData:
+        return self._shapes
+
+
 class Evaluator:
     """Evaluates up to *room* samples at a time; one thread's own."""
 
-    def __init__(self, model: mujoco.MjModel, frames: Frames = NONE, room: int = BLOCK) -> None:
+    def __init__(self, model: mujoco.MjModel, frames: Frames, room: int, shapes: mujoco.MjData) -> None:
         self.room = room
         """samples that it evaluates at a time"""
-        self._batch = Batch(model, room, 1)
+        self._batch = ShapedBatch(model, room, shapes)
         self.model = model
         """the model that is evaluated, a `lean` one"""
         self._poses = Poses(*(self._batch.bind(name) for name in POSES))
@@ -251,15 +263,19 @@ class Engine:
             try:
                 found = self._idle.get_nowait()
             except queue.Empty:
-                return Evaluator(self._lean, self._frames, room)
+                return self._made(room)
             if found.room >= room:  # a smaller one is made for a short batch, and given up for a long one
                 break
         if found.model is not self._lean:
             try:
                 found.take_up(self._lean, self._frames)
             except mujoco.FatalError:  # bodies that MuJoCo calls simple have a smaller mass matrix
-                return Evaluator(self._lean, self._frames, room)
+                return self._made(room)
         return found
+
+    def _made(self, room: int) -> Evaluator:
+        with self.shelf.data_of(self._lean) as shapes:
+            return Evaluator(self._lean, self._frames, room, shapes)
 
     def _workers(self) -> ThreadPoolExecutor:
         # a forked process has no threads, whatever its parent had
