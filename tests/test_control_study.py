@@ -296,7 +296,7 @@ controller = "computed torque"
 
 
 def test_what_a_study_found_stands_in_its_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("workbench.control.run.Supervisor", InThisProcess)
+    monkeypatch.setattr("workbench.sweep.computing.Supervisor", InThisProcess)
     rates = ("rates = [500.0]", "rates = [250.0, 500.0]\nspeeds = [0.5, 1.0]")
     path = write(tmp_path, rates, ("bandwidths = [10.0]", "bandwidths = [10.0, 300.0]"), more=CLAIM)
     out = tmp_path / "out"

@@ -107,8 +107,9 @@ def run(
     from workbench.commands.sweeps import dry_run as print_dry_run
     from workbench.commands.sweeps import report_apart, run_and_print
     from workbench.console import CaseProgress, print_outcome
+    from workbench.sweep.computing import SweepInterrupted
     from workbench.sweep.pick import pick_cases
-    from workbench.sweep.run import SweepInterrupted, SweepOptions
+    from workbench.sweep.resumable import SweepOptions
 
     if robots:
         others: dict[str, object] = {
@@ -133,7 +134,7 @@ def run(
     if spec.control is not None:
         from workbench.commands.studies import refuse_options, run_study_and_print
 
-        given = {"only": only, "dry_run": dry_run, "good": good, "relative": relative, "scheduler": scheduler}
+        given = {"only": only, "dry_run": dry_run, "good": good, "relative": relative}
         given |= {"quick": quick, "keep_going": keep_going, "engines": engines != "mujoco"}
         refuse_options(str(campaign), **given)
         try:
@@ -144,7 +145,7 @@ def run(
                 model=model,
                 settings=values,
                 command=command,
-                options=SweepOptions(jobs, None, fresh, retry_failed, replace),
+                options=SweepOptions(jobs, scheduler, fresh, retry_failed, replace),
                 candidates=candidates or (),
                 controllers=controllers or (),
                 report=report_apart,

@@ -15,7 +15,7 @@ from workbench.commands.sweeps import SweepProgress
 from workbench.console import out, print_changes, print_conclusion
 from workbench.control.run import StudyOutcome, run_study
 from workbench.errors import SpecError
-from workbench.sweep.run import SweepOptions
+from workbench.sweep.resumable import SweepOptions
 
 
 def refuse_options(campaign: str, **given: Any) -> None:

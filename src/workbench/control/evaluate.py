@@ -15,6 +15,7 @@ from workbench.arrays import FloatArray
 from workbench.campaign.cases import Course, course_of, resolve_case
 from workbench.campaign.control_spec import BUILT_IN, NO_MODEL
 from workbench.campaign.evidence import Effort
+from workbench.campaign.provenance import sha256
 from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.user_candidates import load_candidates
 from workbench.capabilities.robot import Robot
@@ -30,7 +31,7 @@ from workbench.errors import WorkbenchError
 from workbench.reference.forward import Plant
 from workbench.reference.replay import quiet
 from workbench.reference.stiff_plant import StiffPlant
-from workbench.sweep.evaluate import NO_MEMORY, Answer
+from workbench.sweep.evaluate import NO_MEMORY, Answer, Packed
 from workbench.sweep.identity import case_key, common_key
 from workbench.sweep.record import FAILED, INVALID, PASSED, Record, lost
 
@@ -95,7 +96,7 @@ class StudyContext:
     candidates: tuple[str, ...] = ()
     controllers: tuple[str, ...] = ()
 
-    def setup(self) -> Callable[[tuple[int, Loop]], Answer]:
+    def setup(self) -> Callable[[tuple[int, Loop]], Packed]:
         """Check that this process gives the same numbers as the one that asks, and return what computes a run.
 
         Raises
@@ -109,7 +110,7 @@ class StudyContext:
             raise WorkbenchError("model, formulas, code or versions of this worker are not those of the run")
         study = Study(plan, self.settings, own)
         study.bench(plan.loops[0])  # kernels are compiled before a run's time is taken
-        return partial(evaluate, study, self.common)
+        return partial(_packed, study, self.common)
 
 
 class Study:
@@ -236,6 +237,10 @@ def compute(study: Study, loop: Loop) -> Outcome:
     return Outcome(tracked, desired, own, halved, second, TRACKED, spread)
 
 
+def _packed(study: Study, common: str, task: tuple[int, Loop]) -> Packed:
+    return evaluate(study, common, task).packed()
+
+
 def evaluate(study: Study, common: str, task: tuple[int, Loop]) -> Answer:
     """Compute one run; errors come back as data.
 
@@ -316,6 +321,6 @@ def study_key(
         "control": plan.spec.model_dump(exclude=set(LISTS + JUDGING)),
         "actuators": torque_limits(plan.campaign, plan.robot),
         "cases": [case.model_dump(exclude={"title", "description"}) for case in plan.campaign.case],
-        "controllers": {one.name: one.file.read_text(encoding="utf-8", errors="replace") for one in own},
+        "controllers": {one.name: [sha256(path.read_bytes()) for path in one.files] for one in own},
     }
     return case_key(keyed, content)

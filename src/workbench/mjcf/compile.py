@@ -47,21 +47,33 @@ def find_model(path: str | Path) -> Path:
     raise ModelError(f"{path}: no such model file", file=str(path))
 
 
+class EvaluationWarnings:
+    """Collects MuJoCo's warnings while models are evaluated; left alone it prints them and writes a log file.
+
+    A class, since it is entered for every block of samples, and a generator's costs as much as a short block does.
+    """
+
+    def __enter__(self) -> list[str]:
+        """From now on warnings go into the list that is returned."""
+        collected: list[str] = []
+        self._before = mujoco.get_mju_user_warning()
+        mujoco.set_mju_user_warning(collected.append)
+        return collected
+
+    def __exit__(self, *_: object) -> None:
+        """Whoever heard them before hears them again."""
+        mujoco.set_mju_user_warning(self._before)
+
+
 @contextlib.contextmanager
 def engine_warnings() -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings; left alone it prints them and writes a log file into the current directory.
+    """As `EvaluationWarnings`, where models are compiled, too.
 
     Those of a specification's own ``compile`` come as Python's UserWarning, and are dropped.
     """
-    collected: list[str] = []
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(collected.append)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            yield collected
-    finally:
-        mujoco.set_mju_user_warning(before)
+    with EvaluationWarnings() as collected, warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        yield collected
 
 
 def compile_spec(spec: mujoco.MjSpec, file: str) -> mujoco.MjModel:
@@ -79,6 +91,8 @@ def compile_spec(spec: mujoco.MjSpec, file: str) -> mujoco.MjModel:
         raise ModelError(f"{file}: MuJoCo does not compile it: {error}", file=file) from error
     numbers = [(name, getattr(model, name)) for name in FINITE]
     numbers += [(f"option {name}", np.atleast_1d(getattr(model.opt, name))) for name in FINITE_OPTIONS]
+    if np.abs(np.concatenate([values.ravel() for _, values in numbers])).max() <= LARGEST_NUMBER:
+        return model
     for name, values in numbers:
         if values.size and not np.abs(values).max() <= LARGEST_NUMBER:
             raise ModelError(

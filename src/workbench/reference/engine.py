@@ -20,7 +20,7 @@ from mujoco.batch import Batch
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, ParameterError
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.compile import EvaluationWarnings, engine_warnings
 from workbench.reference.frames import Frames, place_frames
 from workbench.reference.shelf import Shelf
 
@@ -206,12 +206,12 @@ class Engine:
         self._lean = lean(model)
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
-    @engine_warnings()
     def poses(self, qpos: FloatArray) -> Poses:
         """Evaluate positions of a few configurations ``(k, nq)``, k <= `BLOCK`; the result is a copy."""
         evaluator = self._take()
         evaluator.qpos[: len(qpos)] = qpos
-        poses = evaluator.place(np.arange(len(qpos), dtype=np.int32))
+        with EvaluationWarnings():
+            poses = evaluator.place(np.arange(len(qpos), dtype=np.int32))
         copies = [array[: len(qpos)].copy() for array in poses.tables]
         self._idle.put(evaluator)
         for copied in copies:
@@ -230,7 +230,7 @@ class Engine:
                 self._idle.put(evaluator)
 
         starts = range(0, samples, size)
-        with engine_warnings():
+        with EvaluationWarnings():
             if self.threads == 1 or len(starts) == 1:
                 for first in starts:
                     one(first)

@@ -7,6 +7,7 @@ three hinges through one point, a connect.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import mujoco
@@ -26,6 +27,11 @@ in a file stay below it."""
 LOPSIDED = 0.02
 """As `ROUND`: up to here a rod counts as made for a body of revolution, with the digits of a CAD file and a hole or a
 flat; what the difference is worth in torque is computed. Beyond, it is another body."""
+
+CLEARLY = 0.1
+"""Of `ROUND`: a rod that is rounder than this needs no closer look."""
+
+IDENTITY = np.eye(3)
 
 COPLANAR = 1e-6
 """Determinant of three hinge axes below which they make no spherical joint."""
@@ -155,6 +161,26 @@ class RodFrame:
         seen = turn @ inertia @ turn.T
         uneven = max(abs(seen[0, 1]), abs(seen[0, 2]), abs(seen[1, 2]), abs(seen[1, 1] - seen[2, 2]))
         return Unevenness(self.length, self._off(centre), float(uneven), float(np.trace(inertia)))
+
+    def plainly_round(self) -> bool:
+        """Whether the rod is one body and a body of revolution, well within `ROUND`: most are, and variants are asked.
+
+        Its own inertia is held against the round one that is nearest to it; what they differ by is at least half of
+        `Unevenness.uneven`.
+        """
+        if len(self.group) > 1 or not self.length:
+            return False
+        body = self.group[0]
+        axis = (self.far - self.near) / self.length
+        x, y, z = axis.tolist()
+        a, b, c = (self._model.body_ipos[body] - self.near).tolist()
+        off = math.hypot(y * c - z * b, z * a - x * c, x * b - y * a)
+        inertia = inertia_matrix(self._model, body)
+        trace, along = float(inertia[0, 0] + inertia[1, 1] + inertia[2, 2]), float(axis @ inertia @ axis)
+        across = 0.5 * (trace - along)
+        rest = inertia - (along - across) * np.multiply.outer(axis, axis)
+        gap = math.hypot(*(rest - across * IDENTITY).ravel().tolist())
+        return off <= CLEARLY * ROUND * self.length and gap <= CLEARLY * ROUND * trace
 
     def rounded(self) -> tuple[FloatArray, FloatArray]:
         """Mass centre ``(3,)`` and inertia ``(3, 3)`` about it that make the rod round.

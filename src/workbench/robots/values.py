@@ -73,8 +73,11 @@ def missing(model: mujoco.MjModel, kind: mujoco.mjtObj, tag: str, name: str) -> 
 
 def inertia_matrix(model: mujoco.MjModel, body: int) -> FloatArray:
     """Inertia of a body about its mass centre ``(3, 3)`` in kg m^2, in the axes of its body frame."""
+    quaternion = model.body_iquat[body]
+    if quaternion[0] == 1.0 and not quaternion[1:].any():  # what the product below gives, and many bodies are so
+        return np.diag(model.body_inertia[body])
     rotation = np.empty(9)
-    mujoco.mju_quat2Mat(rotation, model.body_iquat[body])
+    mujoco.mju_quat2Mat(rotation, quaternion)
     matrix = rotation.reshape(3, 3)
     result: FloatArray = matrix @ np.diag(model.body_inertia[body]) @ matrix.T
     return result
