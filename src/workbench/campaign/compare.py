@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from workbench.campaign.recorded_spec import RecordedSpec
 from workbench.campaign.spec import Campaign
 from workbench.campaign.spent import spent_on
 from workbench.campaign.torques import Fault, torques_of
-from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
+from workbench.campaign.unloaded import joint_errors, largest_reaction, normaliser_of
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, RECORDED, kind_of, verdict_of
 from workbench.errors import ModelError, MotionError
 from workbench.hints import hint_of
@@ -77,11 +78,12 @@ class Row:
 
 @dataclass(frozen=True)
 class CaseResult:
-    """What a computed case leaves behind: rows, time series, and facts for the manifest."""
+    """What a computed case leaves behind: rows, facts for the manifest, and time series where somebody asks."""
 
     name: str
     rows: list[Row]
-    series: dict[str, FloatArray] = field(repr=False)
+    columns: Callable[[], dict[str, FloatArray]] = field(repr=False)
+    """how `series` is made; most cases of a sweep keep none"""
     facts: dict[str, Any] = field(repr=False)
     faults: Sequence[Fault] = ()
     """what the user's candidates did wrong"""
@@ -89,6 +91,11 @@ class CaseResult:
     """MuJoCo's model of the reference, the case's parameters in it; with drawings only"""
     qpos: FloatArray | None = field(default=None, repr=False)
     """``(n, nq)`` its poses, MuJoCo's own coordinates; with drawings only"""
+
+    @cached_property
+    def series(self) -> dict[str, FloatArray]:
+        """Time series by name of their column, ``(n,)`` each; docs/run-directory.md lists them."""
+        return self.columns()
 
 
 def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseResult:
@@ -104,7 +111,6 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     motion, robot = case.motion, case.robot
     reference = case.robot.reference
     results: dict[str, ReferenceResult] = {}
-    series = _motion_columns(case)
     try:
         for mass_model in _references(campaign, case):
             results[mass_model] = reference.inverse_dynamics(
@@ -118,7 +124,6 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         raise at_time(error, motion.t) from error
     left = _left_out(case, reference, first)
     platform = platform_of(case, first)
-    series |= platform.columns()
     if robot.closed_kinematics:  # else the case's platform motion is the reference's own
         _refuse_other_branch(case, platform.task[0])
     sound = [name for name in torques if name not in computed.faults]
@@ -135,36 +140,53 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     rows += [row for found in recorded for row in _recorded_rows(case, found, evidence)]
     if effort.budget:
         rows += _raw_rows(case, reference, results, evidence, felt)
-    for mass_model, result in results.items():
-        series |= _columns(f"ref_{mass_model}", result.tau, robot.joints)
-    for name in sound:
-        tau = torques[name]
-        series |= _columns(f"cand_{name}", tau, robot.joints)
-    for found in recorded:
-        series |= _columns(f"rec_{found.spec.label}", found.tau, robot.joints)
-        series |= _columns(f"band_{found.spec.label}", found.band, robot.joints)
-    for joint, force in first.reactions.items():
-        series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
-    series["closure_residual"] = first.closure_residual
     facts = _facts(case, first, rows, platform) | {"evidence": evidence.facts()}
     if effort.described:
         facts |= _description(case, reference, first) | {"demand": demand_facts(case, results)}
     if recorded:
         facts["recorded"] = {found.spec.label: found.facts for found in recorded}
     facts["warnings"] = [*facts["warnings"], *hints, *left]
+    drawn_columns: dict[str, FloatArray] = {}
     if effort.drawing:
         drawing = skeleton(reference, first.qpos)
         for point, place in drawing.points.items():
-            series |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
+            drawn_columns |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
         columns, spent = spent_on(case, reference, next(iter(results)))
-        series |= columns
+        drawn_columns |= columns
         if spent:
             facts["spent"] = spent
     poses, drawn = (first.qpos, reference.compiled()) if effort.drawing else (None, None)
     faults = tuple(computed.faults.values())
     facts = check_kinematics(case, reference, platform).noted(computed.noted(facts))
+
+    def series() -> dict[str, FloatArray]:
+        found = _series(case, platform, results, {name: torques[name] for name in sound}, recorded)
+        return found | drawn_columns
+
     return CaseResult(case.name, rows, series, facts, faults, drawn, poses)
+
+
+def _series(
+    case: Case,
+    platform: Platform,
+    results: Mapping[str, ReferenceResult],
+    torques: Mapping[str, FloatArray],
+    recorded: Sequence[Found],
+) -> dict[str, FloatArray]:
+    """Columns of the time series, in the order in which they are stored."""
+    joints, first = case.robot.joints, platform.result
+    series = _motion_columns(case) | platform.columns()
+    for mass_model, result in results.items():
+        series |= _columns(f"ref_{mass_model}", result.tau, joints)
+    for name, tau in torques.items():
+        series |= _columns(f"cand_{name}", tau, joints)
+    for found in recorded:
+        series |= _columns(f"rec_{found.spec.label}", found.tau, joints)
+        series |= _columns(f"band_{found.spec.label}", found.band, joints)
+    for joint, force in first.reactions.items():
+        series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
+    return series | {"closure_residual": first.closure_residual}
 
 
 def _left_out(case: Case, reference: MujocoReference, result: ReferenceResult) -> tuple[str, ...]:
@@ -239,8 +261,8 @@ def _rows(
     reaction = felt[candidate.reference]
     known = case.robot.candidates.get(candidate.name)
     mass_model = known.mass_model if known else candidate.reference
-    for i, joint in enumerate(case.robot.joints):
-        error = joint_error(tau[:, i], reference.tau[:, i], reaction)
+    errors = joint_errors(tau, reference.tau, reaction)
+    for i, (joint, error) in enumerate(zip(case.robot.joints, errors, strict=True)):
         uncertainty = evidence.uncertainty(candidate.reference, joint)
         judged = candidate.in_case(case.spec, joint)
         rows.append(
@@ -329,7 +351,7 @@ def _facts(case: Case, result: ReferenceResult, rows: list[Row], platform: Platf
     t = case.motion.t
     speed = np.linalg.norm(result.xd, axis=1)
     acceleration = np.linalg.norm(result.xdd, axis=1)
-    measures = case.robot.singularity_measures(case.motion.q)
+    measures = case.singularity
     kinematics = {}
     if case.robot.closed_kinematics:  # else case.x is the reference's own
         kinematics = {

@@ -23,7 +23,8 @@ from workbench.console import err, out, print_changes, print_conclusion
 from workbench.errors import OutputError
 from workbench.sweep.estimate import estimate
 from workbench.sweep.progress import Snapshot
-from workbench.sweep.run import SweepOptions, SweepOutcome, run_sweep
+from workbench.sweep.resumable import SweepOptions
+from workbench.sweep.run import SweepOutcome, run_sweep
 
 LINE_EVERY_S = 10.0
 """Seconds between lines of progress where there is no terminal."""

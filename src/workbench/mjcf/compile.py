@@ -61,6 +61,8 @@ def compile_spec(spec: mujoco.MjSpec, file: str) -> mujoco.MjModel:
         raise ModelError(f"{file}: MuJoCo does not compile it: {error}", file=file) from error
     numbers = [(name, getattr(model, name)) for name in FINITE]
     numbers += [(f"option {name}", np.atleast_1d(getattr(model.opt, name))) for name in FINITE_OPTIONS]
+    if np.abs(np.concatenate([values.ravel() for _, values in numbers])).max() <= LARGEST_NUMBER:
+        return model
     for name, values in numbers:
         if values.size and not np.abs(values).max() <= LARGEST_NUMBER:
             raise ModelError(

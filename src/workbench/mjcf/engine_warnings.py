@@ -26,28 +26,41 @@ _before: list[Callable[[str], Any] | None] = []
 """the handler that was there before anybody listened"""
 
 
-@contextlib.contextmanager
-def engine_warnings() -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings; left alone it prints them and writes a log file into the current directory.
+class EvaluationWarnings:
+    """Collects MuJoCo's warnings while models are evaluated; left alone it prints them and writes a log file.
 
-    Each thread hears its own, those of MuJoCo's own threads are heard by all. What a specification's own ``compile``
-    says comes as Python's UserWarning, and is dropped.
+    Each thread hears its own; those of MuJoCo's own threads are heard by all. A class, since it is entered for every
+    block of samples, and a generator's costs as much as a short block does.
     """
-    mine = threading.get_ident(), list[str]()
-    _drop_what_compile_says()
-    with _changing:
-        if not _listening:
-            _before[:] = [mujoco.get_mju_user_warning()]
-            mujoco.set_mju_user_warning(_heard)
-        _listening.append(mine)
-    try:
-        yield mine[1]
-    finally:
+
+    def __enter__(self) -> list[str]:
+        """From now on warnings go into the list that is returned."""
+        self._mine = threading.get_ident(), list[str]()
+        with _changing:
+            if not _listening:
+                _before[:] = [mujoco.get_mju_user_warning()]
+                mujoco.set_mju_user_warning(_heard)
+            _listening.append(self._mine)
+        return self._mine[1]
+
+    def __exit__(self, *_: object) -> None:
+        """Whoever heard them before hears them again."""
         with _changing:
             # by identity: two that have heard the same are equal
-            _listening[:] = [one for one in _listening if one is not mine]
+            _listening[:] = [one for one in _listening if one is not self._mine]
             if not _listening:
                 mujoco.set_mju_user_warning(_before.pop())
+
+
+@contextlib.contextmanager
+def engine_warnings() -> Iterator[list[str]]:
+    """As `EvaluationWarnings`, where models are compiled, too.
+
+    What a specification's own ``compile`` says comes as Python's UserWarning, and is dropped.
+    """
+    _drop_what_compile_says()
+    with EvaluationWarnings() as heard:
+        yield heard
 
 
 def _heard(warning: str) -> None:

@@ -171,7 +171,7 @@ def series_bytes(result: CaseResult) -> bytes:
 
 
 def _nearest_singularity(case: Case) -> tuple[float, str]:
-    measures = case.robot.singularity_measures(case.motion.q)
+    measures = case.singularity
     if not measures:
         raise SpecError(
             "filter.singularity: this robot has no measure of singular poses; state platform.coordinates in its robot"
