@@ -35,19 +35,22 @@ class EvaluationWarnings:
 
     def __enter__(self) -> list[str]:
         """From now on warnings go into the list that is returned."""
-        self._mine = threading.get_ident(), list[str]()
+        heard: list[str] = []
+        self._mine = threading.get_ident(), heard
         with _changing:
             if not _listening:
-                _before[:] = [mujoco.get_mju_user_warning()]
+                _before.append(mujoco.get_mju_user_warning())
                 mujoco.set_mju_user_warning(_heard)
             _listening.append(self._mine)
-        return self._mine[1]
+        return heard
 
     def __exit__(self, *_: object) -> None:
         """Whoever heard them before hears them again."""
         with _changing:
-            # by identity: two that have heard the same are equal
-            _listening[:] = [one for one in _listening if one is not self._mine]
+            if _listening[-1] is self._mine:
+                _listening.pop()
+            else:  # by identity: two that have heard the same are equal
+                _listening[:] = [one for one in _listening if one is not self._mine]
             if not _listening:
                 mujoco.set_mju_user_warning(_before.pop())
 
