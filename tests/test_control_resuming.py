@@ -271,14 +271,14 @@ def test_a_studys_claims_and_numbers_follow_the_robot(bench: Workbench) -> None:
     verdict, m3, changed, report = found["paper"]
     assert verdict["verdict"] != "not about this robot"
     assert m3["source"] != "--set"
-    assert changed == {("payload", "the case", "heavy")}
+    assert changed == {("payload", "case parameters", "heavy")}
     assert "1 of 1 claims hold" in report or "0 of 1 claims hold" in report
     verdict, m3, changed, report = found["changed"]
     assert verdict["verdict"] == "not about this robot"
     assert "m3" in verdict["sentence"]
     assert (m3["value"], m3["source"]) == (1.5, "--set")
     assert ("m3", "--set", "swing", "heavy") in changed
-    assert "1 claims are not about this robot" in report
+    assert "1 claim is not about this robot" in report
     assert "--set" in report
 
 

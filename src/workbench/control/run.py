@@ -206,7 +206,8 @@ def conclusion_of(summary: Mapping[str, Any]) -> Conclusion:
     claims: Sequence[Mapping[str, Any]] = summary["claims"]
     here = [claim["verdict"] for claim in claims if claim["verdict"] != NOT_ABOUT]
     said = f"; {here.count(HOLDS)} of {len(here)} claims hold" if here else ""
-    others = f"; {len(claims) - len(here)} claims are not about this robot" if len(claims) > len(here) else ""
+    apart = len(claims) - len(here)
+    others = f"; {apart} {'claim is' if apart == 1 else 'claims are'} {NOT_ABOUT}" if apart else ""
     return Conclusion(PASSED, f"{runs}{known}{said}{others}")
 
 
