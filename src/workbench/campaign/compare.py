@@ -111,6 +111,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     """
     motion, robot = case.motion, case.robot
     reference = case.robot.reference
+    reference.threads = effort.threads
     results: dict[str, ReferenceResult] = {}
     try:
         for mass_model in _references(campaign, case):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -189,6 +190,7 @@ def run(
             raise
     else:
         from workbench.diagnosis.brief import brief
+        from workbench.processes import cores
         from workbench.rendering.run_pictures import RunPictures
         from workbench.report import build_report
 
@@ -204,7 +206,7 @@ def run(
                 progress=progress,
                 report=build_report,
                 pictures=RunPictures() if pictures else None,
-                effort=effort,
+                effort=dataclasses.replace(effort, threads=cores()),  # one case after the other: each may take all
                 candidates=candidates or (),
                 pick=pick_cases,
                 explain=brief,
