@@ -11,13 +11,14 @@ from rich.text import Text
 
 from workbench.campaign.evidence import Effort
 from workbench.campaign.run import run_campaign
-from workbench.console import CONCLUSIONS, CaseProgress, err, out
+from workbench.console import CONCLUSIONS
 from workbench.errors import WorkbenchError
 from workbench.library.measure import figures_of
 from workbench.library.page import page, small
 from workbench.library.record import LibraryRecord, RobotFigures, read_record, record_path, write_record
 from workbench.library.shelf import entries
 from workbench.report import build_report
+from workbench.terminal import CaseProgress, err, out
 
 FAILED, BAD_INPUT, NOTHING_JUDGED = 1, 2, 4
 

@@ -12,10 +12,11 @@ from rich.text import Text
 
 from workbench.campaign.spec import Campaign
 from workbench.commands.sweeps import SweepProgress
-from workbench.console import out, print_changes, print_conclusion
+from workbench.console import print_changes, print_conclusion
 from workbench.control.run import StudyOutcome, run_study
 from workbench.errors import SpecError
 from workbench.sweep.resumable import SweepOptions
+from workbench.terminal import out
 
 
 def refuse_options(campaign: str, **given: Any) -> None:
