@@ -107,10 +107,11 @@ def run(
     from workbench.campaign.spec import campaign_names, load_campaign
     from workbench.commands.sweeps import dry_run as print_dry_run
     from workbench.commands.sweeps import report_apart, run_and_print
-    from workbench.console import CaseProgress, print_outcome
+    from workbench.console import print_outcome
     from workbench.sweep.computing import SweepInterrupted
     from workbench.sweep.pick import pick_cases
     from workbench.sweep.resumable import SweepOptions
+    from workbench.terminal import CaseProgress
 
     if robots:
         others: dict[str, object] = {

@@ -12,13 +12,14 @@ from rich.text import Text
 
 from workbench.campaign.spec import Campaign
 from workbench.commands.sweeps import SweepProgress, duration, size
-from workbench.console import out, print_changes, print_conclusion
+from workbench.console import print_changes, print_conclusion
 from workbench.control.estimate import estimate_study
 from workbench.control.files import STUDY
 from workbench.control.plan import pairs_of
 from workbench.control.run import StudyOutcome, run_study
 from workbench.errors import SpecError
 from workbench.sweep.resumable import SweepOptions
+from workbench.terminal import out
 
 PLURALS = {"controller with its model": "controllers with their models"}
 

@@ -19,12 +19,13 @@ from workbench.campaign.evidence import Effort, check_engines
 from workbench.campaign.margins import IN_SWEEPS
 from workbench.campaign.spec import Campaign
 from workbench.campaign.verdict import WITHOUT_BOUND
-from workbench.console import err, out, print_changes, print_conclusion
+from workbench.console import print_changes, print_conclusion
 from workbench.errors import OutputError
 from workbench.sweep.estimate import estimate
 from workbench.sweep.progress import Snapshot
 from workbench.sweep.resumable import SweepOptions
 from workbench.sweep.run import SweepOutcome, run_sweep
+from workbench.terminal import err, out
 
 LINE_EVERY_S = 10.0
 """Seconds between lines of progress where there is no terminal."""
