@@ -15,7 +15,8 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.compiled import compiled, merged
-from workbench.reference.closing import Mechanism, _copy, _copy_rows, _on_side, close_one
+from workbench.reference.bench import Mechanism
+from workbench.reference.closing import _copy, _copy_rows, _on_side, close_one
 from workbench.reference.kernels import follow_tangent, integrate
 from workbench.reference.kinematics import FLOATING, TURNING, _turned
 from workbench.reference.linear import solve
