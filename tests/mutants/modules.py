@@ -20,8 +20,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
 CORE_TESTS = (
     "agreement", "asym_kernel", "asym_literal", "asym_mobility", "body_numbers", "campaign_run", "campaign_spec",
     "case_figures", "closure_kinds", "compare_case", "counted_forces", "errata", "friction", "fuzz_mechanisms",
-    "hints", "idle_rods",
-    "importing", "malformed_mechanisms", "mass_models", "metrics", "mjcf_assumptions", "mjcf_edit", "mjcf_roundtrip",
+    "engine_warnings", "hints", "idle_rods", "importing", "malformed_mechanisms", "mass_models", "metrics",
+    "mjcf_assumptions", "mjcf_edit", "mjcf_roundtrip",
     "mjcf_safety", "mjcf_setup", "mjcf_source", "model_command", "models", "motion_along", "motion_platform",
     "negative_controls", "own_campaign", "own_reference", "pinocchio_reference", "planar_4rprp", "planar_4rprp_model",
     "platform_side", "random_robots", "reactions", "recorded", "reference_closure", "reference_dynamics",
@@ -52,6 +52,7 @@ LOOPS = ("closure_kinds", "own_reference", "idle_rods", "reactions")
 SHORT_TESTS: dict[str, tuple[str, ...]] = {
     "metrics": ("metrics",),
     "campaign/": ("verdict", "compare_case"),
+    "mjcf/engine_warnings": ("engine_warnings",),
     "mjcf/free_joints": ("mjcf_setup", "importing"),
     "mjcf/loop_table": ("urdf",),
     "mjcf/safety": ("mjcf_safety", "mjcf_source"),

@@ -134,6 +134,7 @@ def _run(
         if "workbench" in sys.modules:
             raise RuntimeError("the package was imported before its copy could be")
         os.environ |= {"PYTHONPATH": source, "NUMBA_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": ""}
+        sys.dont_write_bytecode = False  # what is not changed need not be compiled again; see `tree.planted`
         import numba
         import pytest
 

@@ -11,7 +11,7 @@ import contextlib
 import re
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import mujoco
@@ -26,37 +26,44 @@ _before: list[Callable[[str], Any] | None] = []
 """the handler that was there before anybody listened"""
 
 
-class engine_warnings(contextlib.ContextDecorator):  # noqa: N801  # read as a function: with engine_warnings() as said
-    """Collect MuJoCo's warnings; left alone it prints them and writes a log file into the current directory.
+class EvaluationWarnings:
+    """Collects MuJoCo's warnings while models are evaluated; left alone it prints them and writes a log file.
 
-    Each thread hears its own, those of MuJoCo's own threads are heard by all. What a specification's own ``compile``
-    says comes as Python's UserWarning, and is dropped. A class, since it is entered for every block of samples, and a
-    generator's costs as much as a short block does.
+    Each thread hears its own; those of MuJoCo's own threads are heard by all. A class, since it is entered for every
+    block of samples, and a generator's costs as much as a short block does.
     """
 
     def __enter__(self) -> list[str]:
-        """Listen; the list grows."""
+        """From now on warnings go into the list that is returned."""
         heard: list[str] = []
         self._mine = threading.get_ident(), heard
-        _drop_what_compile_says()
         with _changing:
             if not _listening:
-                _before[:] = [mujoco.get_mju_user_warning()]
+                _before.append(mujoco.get_mju_user_warning())
                 mujoco.set_mju_user_warning(_heard)
             _listening.append(self._mine)
         return heard
 
     def __exit__(self, *_: object) -> None:
-        """Listen no more."""
+        """Whoever heard them before hears them again."""
         with _changing:
-            # by identity: two that have heard the same are equal
-            _listening[:] = [one for one in _listening if one is not self._mine]
+            if _listening[-1] is self._mine:
+                _listening.pop()
+            else:  # by identity: two that have heard the same are equal
+                _listening[:] = [one for one in _listening if one is not self._mine]
             if not _listening:
                 mujoco.set_mju_user_warning(_before.pop())
 
-    def _recreate_cm(self) -> engine_warnings:
-        """A decorated function listens anew at every call."""
-        return engine_warnings()
+
+@contextlib.contextmanager
+def engine_warnings() -> Iterator[list[str]]:
+    """As `EvaluationWarnings`, where models are compiled, too.
+
+    What a specification's own ``compile`` says comes as Python's UserWarning, and is dropped.
+    """
+    _drop_what_compile_says()
+    with EvaluationWarnings() as heard:
+        yield heard
 
 
 def _heard(warning: str) -> None:

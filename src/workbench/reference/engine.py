@@ -20,7 +20,7 @@ from mujoco.batch import Batch
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, ParameterError
-from workbench.mjcf.engine_warnings import engine_warnings
+from workbench.mjcf.engine_warnings import EvaluationWarnings, engine_warnings
 from workbench.reference.frames import Frames, place_frames
 from workbench.reference.shelf import Shelf
 
@@ -227,7 +227,7 @@ class Engine:
         """Evaluate positions of a few configurations ``(k, nq)``, k <= `BLOCK`; the result is a copy."""
         evaluator = self._take(len(qpos))
         evaluator.qpos[: len(qpos)] = qpos
-        with engine_warnings():
+        with EvaluationWarnings():
             poses = evaluator.place(np.arange(len(qpos), dtype=np.int32))
         copies = [array[: len(qpos)].copy() for array in poses.tables]
         self._idle.put(evaluator)
@@ -247,7 +247,7 @@ class Engine:
                 self._idle.put(evaluator)
 
         starts = range(0, samples, size)
-        with engine_warnings():
+        with EvaluationWarnings():
             if self.threads == 1 or len(starts) == 1:
                 for first in starts:
                     one(first)
