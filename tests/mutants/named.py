@@ -83,7 +83,7 @@ NAMED: dict[str, Named] = {
     "undecided is no failure": Named(VERDICT, "FAILURES = frozenset({FAIL, UNEXPECTED_PASS, UNDECIDED})", "FAILURES = frozenset({FAIL, UNEXPECTED_PASS})"),
     # rows of constraints
     "row of a gear halved": Named(ROWS, "jac[row, dof_of[s1]] = 1.0", "jac[row, dof_of[s1]] = 0.5"),
-    "slope of a gear halved": Named(ROWS, "jac[row, dof_of[s2]] = -(c[1]", "jac[row, dof_of[s2]] = -0.5 * (c[1]"),
+    "slope of a gear halved": Named(ROWS, "jac[row, dof_of[s2]] = -_slope(", "jac[row, dof_of[s2]] = -0.5 * _slope("),
     "row of a spin halved": Named(ROWS, "                jac[row, d] = s\n", "                jac[row, d] = 0.5 * s\n"),
     "row of a tendon halved": Named(ROWS, "jac[row, dof_of[j]] += tendons[s1, j]", "jac[row, dof_of[j]] += 0.5 * tendons[s1, j]"),
     "row of the other tendon halved": Named(ROWS, "jac[row, dof_of[j]] -= slope * tendons[s2, j]", "jac[row, dof_of[j]] -= 0.5 * slope * tendons[s2, j]"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -106,10 +107,11 @@ def run(
     from workbench.campaign.spec import campaign_names, load_campaign
     from workbench.commands.sweeps import dry_run as print_dry_run
     from workbench.commands.sweeps import report_apart, run_and_print
-    from workbench.console import CaseProgress, print_outcome
+    from workbench.console import print_outcome
     from workbench.sweep.computing import SweepInterrupted
     from workbench.sweep.pick import pick_cases
     from workbench.sweep.resumable import SweepOptions
+    from workbench.terminal import CaseProgress
 
     if robots:
         others: dict[str, object] = {
@@ -189,6 +191,7 @@ def run(
             raise
     else:
         from workbench.diagnosis.brief import brief
+        from workbench.processes import cores
         from workbench.rendering.run_pictures import RunPictures
         from workbench.report import build_report
 
@@ -204,7 +207,7 @@ def run(
                 progress=progress,
                 report=build_report,
                 pictures=RunPictures() if pictures else None,
-                effort=effort,
+                effort=dataclasses.replace(effort, threads=cores()),  # one case after the other: each may take all
                 candidates=candidates or (),
                 pick=pick_cases,
                 explain=brief,

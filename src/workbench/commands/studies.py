@@ -12,12 +12,14 @@ from rich.text import Text
 
 from workbench.campaign.spec import Campaign
 from workbench.commands.sweeps import SweepProgress, duration, size
-from workbench.console import out, print_changes, print_conclusion
+from workbench.console import print_changes, print_conclusion
 from workbench.control.estimate import estimate_study
+from workbench.control.files import STUDY
 from workbench.control.plan import pairs_of
 from workbench.control.run import StudyOutcome, run_study
 from workbench.errors import SpecError
 from workbench.sweep.resumable import SweepOptions
+from workbench.terminal import out
 
 PLURALS = {"controller with its model": "controllers with their models"}
 
@@ -77,7 +79,7 @@ def run_study_and_print(
     controllers: Sequence[str | Path] = (),
 ) -> int:
     """Run a study, write its report and print its outcome; return the exit code."""
-    with SweepProgress() as progress:
+    with SweepProgress(STUDY.parts) as progress:
         outcome = run_study(
             campaign,
             file,

@@ -12,7 +12,7 @@ from workbench.campaign.user_candidates import full_names, load_candidates
 from workbench.control.evaluate import Study, evaluate, study_key
 from workbench.control.plan import Loop, StudyPlan, plan_study
 from workbench.control.user_controller import load_controllers
-from workbench.sweep.computing import cores
+from workbench.processes import cores
 from workbench.sweep.estimate import BYTES_KEPT, LONG_ENOUGH_S
 from workbench.sweep.record import GOOD
 

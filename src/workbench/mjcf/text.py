@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
+from typing import NamedTuple
 
 from workbench.errors import ModelError
 from workbench.mjcf.safety import not_finite, refuse_element
@@ -20,7 +21,7 @@ from workbench.mjcf.safety import not_finite, refuse_element
 TAG = re.compile(r"""<[^\s/>]+(?:\s+[^\s=/>]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*/?>""")
 ATTRIBUTE = re.compile(r"""([^\s=<>/]+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 TOKEN = re.compile(r"\S+")
-SUSPECT = re.compile(r"nan|inf", re.IGNORECASE)
+SUSPECT = ("nan", "inf")
 
 SECTIONS = {"option": "option"}
 """Section in which an element that carries parameters stands; ``worldbody`` where not said. Other sections use some of
@@ -30,8 +31,7 @@ PLAIN_DIGITS = 17
 """Significant digits that every double fits into; a longer token holds more than the double (`precise`)."""
 
 
-@dataclass(frozen=True)
-class Element:
+class Element(NamedTuple):
     """One start tag: its name, the body that holds it, the section it stands in, and where its text lies."""
 
     tag: str
@@ -90,7 +90,8 @@ def scan(text: str, file: str, included: bool = False) -> Elements:
     path: list[tuple[str, int]] = []
     names: set[str] = set()
     suspects: list[tuple[str, str, str, int]] = []
-    suspicious = SUSPECT.search(text) is not None
+    lower = text.lower()
+    suspicious = any(word in lower for word in SUSPECT)
     parser = expat.ParserCreate("utf-8")
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
@@ -186,14 +187,28 @@ def written(text: str, elements: list[Element], tag: str, name: str, attribute: 
 
     Without an ``<inertial>`` a body's mass is that of its only geom; its inertia may be written as ``fullinertia``.
     """
+    found = _written(text, elements, tag, name, attribute)
+    return found[:2] if found else None
+
+
+def numbers_written(text: str, elements: list[Element], tag: str, name: str, attribute: str) -> int:
+    """How many numbers stand where `written` finds an attribute; 0 where it finds none."""
+    found = _written(text, elements, tag, name, attribute)
+    return len(text[slice(*found[2])].split()) if found else 0
+
+
+def _written(
+    text: str, elements: list[Element], tag: str, name: str, attribute: str
+) -> tuple[Element, str, tuple[int, int]] | None:
     element = find(elements, tag, name)
     if element is None and (tag, attribute) == ("inertial", "mass"):
         element = _only_geom(elements, name)
     if element is None:
         return None
     for spelt in (attribute, *(["fullinertia"] if attribute == "diaginertia" else [])):
-        if attribute_span(text, element, spelt) is not None:
-            return element, spelt
+        span = attribute_span(text, element, spelt)
+        if span is not None:
+            return element, spelt, span
     return None
 
 

@@ -221,7 +221,7 @@ class Engine:
         self.shelf = shelf or Shelf()
         self._idle = self.shelf.evaluators
         self._lean = lean(model)
-        self._pool: tuple[int, ThreadPoolExecutor] | None = None
+        self._pool: tuple[tuple[int, int], ThreadPoolExecutor] | None = None
 
     def poses(self, qpos: FloatArray) -> Poses:
         """Evaluate positions of a few configurations ``(k, nq)``, k <= `BLOCK`; the result is a copy."""
@@ -279,8 +279,8 @@ class Engine:
 
     def _workers(self) -> ThreadPoolExecutor:
         # a forked process has no threads, whatever its parent had
-        if self._pool is None or self._pool[0] != os.getpid():
-            self._pool = os.getpid(), ThreadPoolExecutor(self.threads, thread_name_prefix="workbench")
+        if self._pool is None or self._pool[0] != (os.getpid(), self.threads):
+            self._pool = (os.getpid(), self.threads), ThreadPoolExecutor(self.threads, thread_name_prefix="workbench")
         return self._pool[1]
 
 

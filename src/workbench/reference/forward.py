@@ -14,8 +14,8 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
+from workbench.reference.bench import bench
 from workbench.reference.body_forces import felt_gravity
-from workbench.reference.closing import bench
 from workbench.reference.forward_kernels import DONE, OPEN, Masses, accelerations, hold, move, room_for
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.reference.sides import UNKNOWN

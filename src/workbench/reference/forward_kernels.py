@@ -15,7 +15,8 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.compiled import compiled, merged, types
-from workbench.reference.closing import Mechanism, _copy, _copy_rows, _on_side, close_one
+from workbench.reference.bench import Mechanism
+from workbench.reference.closing import _copy, _copy_rows, _on_side, close_one
 from workbench.reference.kernels import follow_tangent, integrate
 from workbench.reference.kinematics import FLOATING, TURNING, _turned
 from workbench.reference.linear import solve
@@ -327,6 +328,7 @@ def _close_at(mechanism, rules, w, r, q, time):  # type: ignore[no-untyped-def]
     for j in range(q.shape[0]):
         w.predicted[mechanism.actuated_qpos[j]] = q[j]
     _copy(w.predicted, w.qpos)
+    w.best[1] = math.sqrt(moved) if time > 0.0 else math.inf  # where a run begins nothing was factored
     close_one(mechanism, rules, w)
     for i in range(w.here.shape[0]):
         squared += ((w.kept[i] - w.predicted[i]) * mechanism.coordinate_weights[i]) ** 2

@@ -21,6 +21,7 @@ from workbench.mjcf.text import (
     Edit,
     Element,
     numbers_replaced,
+    numbers_written,
     significant_digits,
     tokens,
     written,
@@ -144,8 +145,8 @@ def is_written(text: str, elements: list[Element], target: Target) -> bool:
     """Whether a number stands literally in the file, so that it can be set; else MuJoCo computes it from others."""
     if target.element == "distance":
         return False
-    place = written(text, elements, target.element, target.name, target.attribute)
-    return place is not None and len(tokens(text, *place)) > max(target.index, 0)
+    count = numbers_written(text, elements, target.element, target.name, target.attribute)
+    return count > max(target.index, 0)
 
 
 def read_parameters(

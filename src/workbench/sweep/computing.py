@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from workbench.errors import SpecError
+from workbench.processes import cores
 from workbench.sweep.evaluate import Answer, Packed
 from workbench.sweep.inputs import Inputs
 from workbench.sweep.journal import Journal
@@ -37,11 +37,6 @@ class Pool(Protocol):
 
 Limits = tuple[float, float, int]
 """Seconds and GB that a part may take, and how often one whose worker died is tried again."""
-
-
-def cores() -> int:
-    """Number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def start_pool(setup: Setup, limits: Limits, options: SweepOptions, tasks: int) -> Pool:

@@ -17,7 +17,7 @@ from workbench.campaign.evidence import Effort
 from workbench.campaign.not_driven import NotDriven, refuse_none
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate, full_names, load_candidates, with_rows
-from workbench.sweep.computing import cores
+from workbench.processes import cores
 from workbench.sweep.evaluate import Context, evaluate, series_bytes
 from workbench.sweep.identity import common_key
 from workbench.sweep.pick import pick_cases

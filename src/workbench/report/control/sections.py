@@ -12,9 +12,9 @@ from workbench.report.control.load import MOST_ROWS, StudyRun
 from workbench.report.plot import Plot
 from workbench.report.section import Section, plain_section
 from workbench.report.sections import NO_REAL_ROBOT, parameters_section, reproduce_section
-from workbench.report.tables import HOLDS, REFUTED, UNDECIDED, Cell, Status, Table, columns
+from workbench.report.tables import HOLDS, NOT_ABOUT, REFUTED, UNDECIDED, Cell, Status, Table, columns
 
-LOOKS = {"holds": HOLDS, "does not hold": REFUTED}
+LOOKS = {"holds": HOLDS, "does not hold": REFUTED, NOT_ABOUT.text: NOT_ABOUT}
 
 DECIDED = 0.1
 """An error that is not known to this part of itself is called undecided."""
@@ -57,6 +57,7 @@ def _answer_section(run: StudyRun) -> Section:
         for claim in study.claims:
             differing = [name for name, verdict in claim.varied.items() if verdict not in (claim.verdict, NOT_RUN)]
             robust = "the same throughout" if not differing else "another verdict with: " + ", ".join(differing)
+            robust = robust if claim.varied else ""
             rows.append(
                 (
                     Cell(claim.text), Cell(claim.source), Cell(status=_status(claim.verdict)),
@@ -74,20 +75,24 @@ def _answer_section(run: StudyRun) -> Section:
                 " share with half the plant's step, or by MuJoCo's own integrator and loops.",
             )
         )
-        names = list(dict.fromkeys(name for claim in study.claims for name in claim.varied))
-        tables.append(
-            Table(
-                "control-varied",
-                "The same verdicts with step, integrator and gains varied.",
-                columns(("Claim", *names)),
-                tuple(
-                    (Cell(claim.id), *(_varied(claim.varied.get(name, NOT_RUN)) for name in names))
-                    for claim in study.claims
-                ),
-                "Each column judges all claims again: by runs at half the step, by MuJoCo's route, by one bandwidth.",
-            )
-        )
+        tables += _varied_table(run)
     return plain_section("answer", "Is the model enough for control", [run.manifest.verdict, counts], tables)
+
+
+def _varied_table(run: StudyRun) -> list[Table]:
+    claims = [claim for claim in run.study.claims if claim.varied]
+    names = list(dict.fromkeys(name for claim in claims for name in claim.varied))
+    if not claims:
+        return []
+    return [
+        Table(
+            "control-varied",
+            "The same verdicts with step, integrator and gains varied.",
+            columns(("Claim", *names)),
+            tuple((Cell(claim.id), *(_varied(claim.varied.get(name, NOT_RUN)) for name in names)) for claim in claims),
+            "Each column judges all claims again: by runs at half the step, by MuJoCo's route, by one bandwidth.",
+        )
+    ]
 
 
 def _cases(run: StudyRun) -> list[str]:
