@@ -2,8 +2,9 @@
 
     python benchmarks/paired.py ../before/src --robots models/asym_2rss_ppap.xml models/planar_4rprp.xml
 
-Each measurement is a process of its own with one of the two sources on its path; least of many calls, so that what else
-the machine does counts little. MuJoCo's own evaluation of the same states, once, stands beside.
+Each version is a process of its own with its source on its path, and they are called in turn, one call each, least of
+many calls, so that what else the machine does counts little and alike. MuJoCo's own evaluation of the same states,
+once, stands beside, in the process and the turn of the version of this file.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ SLIDE = 0.05
 """m: what slides moves less"""
 
 
-def measure(robot: str, samples: int, calls: int) -> dict[str, object]:
-    """CPU microseconds a sample of this process's own version, MuJoCo's alone, and the torques."""
+def serve(robot: str, samples: int) -> None:
+    """Answer each line of standard input by a line: CPU microseconds a sample, MuJoCo's alone; at the end torques."""
     import workbench as wb
 
     made = wb.load_robot(robot)
@@ -38,21 +39,38 @@ def measure(robot: str, samples: int, calls: int) -> dict[str, object]:
     qd, qdd = size * rate * np.cos(rate * t), -size * rate**2 * np.sin(rate * t)
     # two motions in turn, so that nothing is at hand from the call before
     motions = [(q, qd, qdd), (q[:-1], qd[:-1], qdd[:-1])]
-    least, found = np.inf, None
-    for call in range(2 * calls):
-        motion = motions[call % 2]
-        clock = time.process_time()
-        result = reference.inverse_dynamics(*motion, along=t[: len(motion[0]), 0])
-        least = min(least, (time.process_time() - clock) / len(motion[0]))
-        found = result if call % 2 == 0 else found
-    assert found is not None
+    whole = reference.inverse_dynamics(*motions[0], along=t[:, 0])
     engine = reference._engine("distributed")
-    alone = []
-    for _ in range(calls):
+    for call, line in enumerate(sys.stdin):
+        if not line.strip():
+            break
+        motion = motions[(call + 1) % 2]
         clock = time.process_time()
-        engine.in_blocks(lambda evaluator, rows: evaluator.move(found.qpos[rows], found.qvel[rows]) and None, samples)
-        alone.append((time.process_time() - clock) / samples)
-    return {"us": 1e6 * least, "mujoco_us": 1e6 * min(alone), "tau": found.tau.tolist()}
+        reference.inverse_dynamics(*motion, along=t[: len(motion[0]), 0])
+        us = (time.process_time() - clock) / len(motion[0])
+        clock = time.process_time()
+        engine.in_blocks(lambda evaluator, rows: evaluator.move(whole.qpos[rows], whole.qvel[rows]) and None, samples)
+        alone = (time.process_time() - clock) / samples
+        print(json.dumps([1e6 * us, 1e6 * alone]), flush=True)
+    print(json.dumps(whole.tau.tolist()), flush=True)
+
+
+class Side:
+    """One version, in a process of its own."""
+
+    def __init__(self, source: str, robot: str, samples: int) -> None:
+        path = {**os.environ, "PYTHONPATH": str(Path(source).resolve())}
+        command = [sys.executable, __file__, "-", "--robots", robot, "--samples", str(samples)]
+        self._process = subprocess.Popen(command, env=path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def ask(self, line: str) -> list[object]:
+        """The answer to a line."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(line + "\n")
+        self._process.stdin.flush()
+        answer: list[object] = json.loads(self._process.stdout.readline())
+        return answer
 
 
 def main() -> None:
@@ -61,30 +79,23 @@ def main() -> None:
     parser.add_argument("before", help="the other version's src directory")
     parser.add_argument("--robots", nargs="+", required=True)
     parser.add_argument("--samples", type=int, default=5000)
-    parser.add_argument("--calls", type=int, default=8)
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--rounds", type=int, default=40, help="calls of each version")
     given = parser.parse_args()
     if given.before == "-":
-        print(json.dumps(measure(given.robots[0], given.samples, given.calls)))
+        serve(given.robots[0], given.samples)
         return
     for robot in given.robots:
-        least: dict[str, dict[str, object]] = {}
-        for _ in range(given.rounds):
-            for name, source in (("before", given.before), ("now", str(HERE))):
-                command = [sys.executable, __file__, "-", "--robots", robot, "--samples", str(given.samples)]
-                command += ["--calls", str(given.calls)]
-                path = {**os.environ, "PYTHONPATH": str(Path(source).resolve())}
-                run = subprocess.run(command, env=path, capture_output=True, text=True, check=True)
-                one = json.loads(run.stdout)
-                if name not in least or one["us"] < least[name]["us"]:
-                    least[name] = one
-        before, now = least["before"], least["now"]
-        tau = [np.array(one["tau"]) for one in (before, now)]
+        sides = [Side(source, robot, given.samples) for source in (given.before, str(HERE))]
+        times = np.array([[side.ask("go") for side in sides] for _ in range(given.rounds)], dtype=np.float64)
+        before, now = times[:, :, 0].min(axis=0)
+        mujoco = float(times[:, 1, 1].min())
+        tau = [np.array(side.ask("")) for side in sides]
         gap = float((np.abs(tau[0] - tau[1]).max(axis=0) / np.abs(tau[0]).max(axis=0)).max())
         print(
-            f"{robot}: {before['us']:.2f} -> {now['us']:.2f} us a sample, ratio {now['us'] / before['us']:.3f};"
-            f" MuJoCo once {now['mujoco_us']:.2f} us, ratio to it {now['us'] / now['mujoco_us']:.2f};"
-            f" torques differ by {gap:.1e} of their peak",
+            f"{robot}: {before:.2f} -> {now:.2f} us a sample, ratio {now / before:.3f}"
+            f" (median of ratios in one turn {np.median(times[:, 1, 0] / times[:, 0, 0]):.3f});"
+            f" MuJoCo once {mujoco:.2f} us, ratio to it {now / mujoco:.2f}"
+            f" ({np.median(times[:, 1, 0] / times[:, 1, 1]):.2f}); torques differ by {gap:.1e} of their peak",
             flush=True,
         )
 

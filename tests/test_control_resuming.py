@@ -15,6 +15,7 @@ import pytest
 
 from small_campaign import SMALL, Workbench, listing
 from workbench.motion import JointMotion
+from workbench.report.build import build_report
 
 STUDY = """
 format = 1
@@ -242,3 +243,54 @@ def test_a_study_on_a_cluster_gives_the_same_bytes(
     assert done.code == 0, done.err
     for name in ("runs.parquet", "errors.parquet", "control.json", "journal.jsonl"):
         assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
+
+
+CLAIM = """
+[[control.claim]]
+id = "enough"
+text = "lumped is enough"
+source = "somebody"
+kind = "enough"
+model = "lumped"
+against = "distributed"
+controller = "computed torque"
+"""
+
+
+def test_a_studys_claims_and_numbers_follow_the_robot(bench: Workbench) -> None:
+    own = STUDY.replace("[control]", CASE_OF_ANOTHER_PAYLOAD + "[control]") + CLAIM + 'cases = ["swing"]\n'
+    found = {}
+    for name, options in (("paper", ()), ("changed", ("--set", "m3=1.5"))):
+        assert bench.run(own, "--out", name, *options).code == 0
+        manifest = json.loads((bench.directory / name / "manifest.json").read_text(encoding="utf-8"))
+        verdict = json.loads((bench.directory / name / "control.json").read_text(encoding="utf-8"))["claims"][0]
+        m3 = next(one for one in manifest["parameters"] if one["name"] == "m3")
+        changed = {(c["name"], c["by"], *c["cases"]) for c in manifest["changes"]["parameters"]}
+        build_report(bench.directory / name, ("md",))
+        found[name] = verdict, m3, changed, (bench.directory / name / "report.md").read_text(encoding="utf-8")
+    verdict, m3, changed, report = found["paper"]
+    assert verdict["verdict"] != "not about this robot"
+    assert m3["source"] != "--set"
+    assert changed == {("payload", "case parameters", "heavy")}
+    assert "1 of 1 claims hold" in report or "0 of 1 claims hold" in report
+    verdict, m3, changed, report = found["changed"]
+    assert verdict["verdict"] == "not about this robot"
+    assert "m3" in verdict["sentence"]
+    assert (m3["value"], m3["source"]) == (1.5, "--set")
+    assert ("m3", "--set", "swing", "heavy") in changed
+    assert "1 claim is not about this robot" in report
+    assert "--set" in report
+
+
+CASE_OF_ANOTHER_PAYLOAD = """
+[[case]]
+name = "heavy"
+parameters = { payload = 1.5 }
+[case.motion]
+kind = "sine"
+offset = [0.0, 0.75, 0.8]
+amplitude = [0.05, 0.2, 0.2]
+frequency = [8.0, 17.0, 23.0]
+stop = 0.05
+samples = 21
+"""

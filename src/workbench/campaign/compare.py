@@ -19,6 +19,7 @@ from workbench.campaign.kinematics import check_kinematics
 from workbench.campaign.platform import Platform, platform_of
 from workbench.campaign.recorded import Found, judge
 from workbench.campaign.recorded_spec import RecordedSpec
+from workbench.campaign.series import series_of
 from workbench.campaign.spec import Campaign
 from workbench.campaign.spent import spent_on
 from workbench.campaign.torques import Fault, torques_of
@@ -162,32 +163,10 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     facts = check_kinematics(case, reference, platform).noted(computed.noted(facts))
 
     def series() -> dict[str, FloatArray]:
-        found = _series(case, platform, results, {name: torques[name] for name in sound}, recorded)
+        found = series_of(case, platform, results, {name: torques[name] for name in sound}, recorded)
         return found | drawn_columns
 
     return CaseResult(case.name, rows, series, facts, faults, drawn, poses)
-
-
-def _series(
-    case: Case,
-    platform: Platform,
-    results: Mapping[str, ReferenceResult],
-    torques: Mapping[str, FloatArray],
-    recorded: Sequence[Found],
-) -> dict[str, FloatArray]:
-    """Columns of the time series, in the order in which they are stored."""
-    joints, first = case.robot.joints, platform.result
-    series = _motion_columns(case) | platform.columns()
-    for mass_model, result in results.items():
-        series |= _columns(f"ref_{mass_model}", result.tau, joints)
-    for name, tau in torques.items():
-        series |= _columns(f"cand_{name}", tau, joints)
-    for found in recorded:
-        series |= _columns(f"rec_{found.spec.label}", found.tau, joints)
-        series |= _columns(f"band_{found.spec.label}", found.band, joints)
-    for joint, force in first.reactions.items():
-        series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
-    return series | {"closure_residual": first.closure_residual}
 
 
 def _left_out(case: Case, reference: MujocoReference, result: ReferenceResult) -> tuple[str, ...]:
@@ -333,18 +312,6 @@ def _recorded_rows(case: Case, found: Found, evidence: Evidence) -> list[Row]:
         )
         for i, one in enumerate(found.joints)
     ]
-
-
-def _columns(prefix: str, values: FloatArray, joints: tuple[str, ...]) -> dict[str, FloatArray]:
-    return {f"{prefix}_{joint}": values[:, i] for i, joint in enumerate(joints)}
-
-
-def _motion_columns(case: Case) -> dict[str, FloatArray]:
-    motion = case.motion
-    columns: dict[str, FloatArray] = {"t": motion.t}
-    for prefix, values in (("q", motion.q), ("qd", motion.qd), ("qdd", motion.qdd)):
-        columns |= {f"{prefix}{i + 1}": values[:, i] for i in range(values.shape[1])}
-    return columns
 
 
 def _facts(case: Case, result: ReferenceResult, rows: list[Row], platform: Platform) -> dict[str, Any]:

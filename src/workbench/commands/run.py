@@ -107,10 +107,11 @@ def run(
     from workbench.campaign.spec import campaign_names, load_campaign
     from workbench.commands.sweeps import dry_run as print_dry_run
     from workbench.commands.sweeps import report_apart, run_and_print
-    from workbench.console import CaseProgress, print_outcome
+    from workbench.console import print_outcome
     from workbench.sweep.computing import SweepInterrupted
     from workbench.sweep.pick import pick_cases
     from workbench.sweep.resumable import SweepOptions
+    from workbench.terminal import CaseProgress
 
     if robots:
         others: dict[str, object] = {
@@ -133,11 +134,14 @@ def run(
     command = ["workbench", *sys.argv[1:]]
     spec, file = load_campaign(campaign)
     if spec.control is not None:
-        from workbench.commands.studies import refuse_options, run_study_and_print
+        from workbench.commands.studies import dry_run_study, refuse_options, run_study_and_print
 
-        given = {"only": only, "dry_run": dry_run, "good": good, "relative": relative}
+        given = {"only": only, "good": good, "relative": relative}
         given |= {"quick": quick, "keep_going": keep_going, "engines": engines != "mujoco"}
         refuse_options(str(campaign), **given)
+        if dry_run:
+            dry_run_study(spec, file, model, values, jobs, candidates or (), controllers or ())
+            return
         try:
             code = run_study_and_print(
                 spec,

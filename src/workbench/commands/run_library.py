@@ -12,7 +12,7 @@ from rich.text import Text
 
 from workbench.campaign.evidence import Effort
 from workbench.campaign.run import run_campaign
-from workbench.console import CONCLUSIONS, CaseProgress, err, out
+from workbench.console import CONCLUSIONS
 from workbench.errors import WorkbenchError
 from workbench.library.measure import figures_of
 from workbench.library.page import page, small
@@ -20,6 +20,7 @@ from workbench.library.record import LibraryRecord, RobotFigures, read_record, r
 from workbench.library.shelf import entries
 from workbench.processes import cores
 from workbench.report import build_report
+from workbench.terminal import CaseProgress, err, out
 
 FAILED, BAD_INPUT, NOTHING_JUDGED = 1, 2, 4
 

@@ -11,14 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from workbench.campaign import store
-from workbench.campaign.changes import Variant, changes_of
+from workbench.campaign.changes import Changes, Variant, changes_of
 from workbench.campaign.conclusion import FAILED, INCOMPLETE, PASSED, Conclusion
 from workbench.campaign.manifest import describe
 from workbench.campaign.replacing import request_of
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import full_names, load_candidates
+from workbench.capabilities.robot import Robot
 from workbench.control import files as study_files
-from workbench.control.claims import HOLDS, Known, Verdict, judged
+from workbench.control.claims import HOLDS, NOT_ABOUT, Known, Verdict, judged
 from workbench.control.evaluate import StudyContext, study_key
 from workbench.control.figures import is_decided
 from workbench.control.files import STUDY
@@ -34,6 +35,8 @@ from workbench.sweep.journal import Journal
 from workbench.sweep.progress import Show
 from workbench.sweep.record import GOOD, Record, parse_line
 from workbench.sweep.resumable import Asked, SweepOptions, resumed
+
+NOTHING_CHANGED = Changes()
 
 
 @dataclass(frozen=True)
@@ -106,8 +109,11 @@ def run_study(
             records = study_files.read_all(journal, len(plan.loops))
         study_files.write_journal(directory, records)
         study_files.write_tables(directory, plan.loops, records)
-        summary = summarise(plan, records)
-        manifest = _manifest(plan, summary, model, settings) | {
+        robots = plan.robots(settings)
+        variants = [Variant(case.name, robots[case.name], case.parameters) for case in campaign.case]
+        changes = changes_of(campaign, file, model, settings, (), variants)
+        summary = summarise(plan, records, changes)
+        manifest = _manifest(plan, summary, robots[campaign.case[0].name], changes) | {
             "command": shlex.join(command),
             "request": request,
             "started": started.isoformat(timespec="seconds"),
@@ -152,10 +158,14 @@ def known_runs(plan: StudyPlan, records: Sequence[Record]) -> list[Known]:
     return found
 
 
-def summarise(plan: StudyPlan, records: Sequence[Record]) -> dict[str, Any]:
-    """What stands in ``control.json``: counts, how well errors are known, claims with their verdicts."""
+def summarise(plan: StudyPlan, records: Sequence[Record], changes: Changes = NOTHING_CHANGED) -> dict[str, Any]:
+    """What stands in ``control.json``: counts, how well errors are known, claims with their verdicts.
+
+    A claim about a case whose robot is another than the published one is not judged.
+    """
     runs = known_runs(plan, records)
-    verdicts = judged(plan.spec, runs)
+    others = {case.name: changes.why_not(case.name) for case in plan.campaign.case}
+    verdicts = judged(plan.spec, runs, {case: why for case, why in others.items() if why})
     unstable = [record for record in records if record.status in GOOD and not record.rows]
     undecided = [run for run in runs if run.errors and not _is_known(run, plan.spec.second_route == "all")]
     failed = [record for record in records if record.status not in GOOD]
@@ -194,19 +204,17 @@ def conclusion_of(summary: Mapping[str, Any]) -> Conclusion:
         status = FAILED if summary["failed"] == summary["runs"] else INCOMPLETE
         return Conclusion(status, f"{runs}{known}; {summary['failed']} could not be computed: {summary['reasons'][0]}")
     claims: Sequence[Mapping[str, Any]] = summary["claims"]
-    said = f"; {sum(c['verdict'] == HOLDS for c in claims)} of {len(claims)} claims hold" if claims else ""
-    return Conclusion(PASSED, f"{runs}{known}{said}")
+    here = [claim["verdict"] for claim in claims if claim["verdict"] != NOT_ABOUT]
+    said = f"; {here.count(HOLDS)} of {len(here)} claims hold" if here else ""
+    apart = len(claims) - len(here)
+    others = f"; {apart} {'claim is' if apart == 1 else 'claims are'} {NOT_ABOUT}" if apart else ""
+    return Conclusion(PASSED, f"{runs}{known}{said}{others}")
 
 
-def _manifest(
-    plan: StudyPlan, summary: Mapping[str, Any], model: Path | None, settings: Mapping[str, float]
-) -> dict[str, Any]:
+def _manifest(plan: StudyPlan, summary: Mapping[str, Any], robot: Robot, changes: Changes) -> dict[str, Any]:
     campaign = plan.campaign
-    first = campaign.case[0]
-    variant = Variant(first.name, plan.robot, first.parameters)
-    changes = changes_of(campaign, plan.file, model, settings, (), [variant])
     found = conclusion_of(summary)
-    return describe(campaign, plan.file, plan.model, plan.robot, first.name, changes) | {
+    return describe(campaign, plan.file, plan.model, robot, campaign.case[0].name, changes) | {
         "format": store.FORMAT,
         "status": found.status,
         "verdict": found.sentence,

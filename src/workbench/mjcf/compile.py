@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import warnings
-from collections.abc import Iterator
 from pathlib import Path
 
 import mujoco
@@ -13,6 +11,7 @@ import numpy as np
 from workbench.data_files import bundled
 from workbench.errors import ModelError, WorkbenchError
 from workbench.limits import LARGEST_NUMBER
+from workbench.mjcf.engine_warnings import engine_warnings
 
 FINITE = (
     "qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
@@ -45,35 +44,6 @@ def find_model(path: str | Path) -> Path:
         with contextlib.suppress(WorkbenchError):  # the message below says it better
             return bundled("models", path.name)
     raise ModelError(f"{path}: no such model file", file=str(path))
-
-
-class EvaluationWarnings:
-    """Collects MuJoCo's warnings while models are evaluated; left alone it prints them and writes a log file.
-
-    A class, since it is entered for every block of samples, and a generator's costs as much as a short block does.
-    """
-
-    def __enter__(self) -> list[str]:
-        """From now on warnings go into the list that is returned."""
-        collected: list[str] = []
-        self._before = mujoco.get_mju_user_warning()
-        mujoco.set_mju_user_warning(collected.append)
-        return collected
-
-    def __exit__(self, *_: object) -> None:
-        """Whoever heard them before hears them again."""
-        mujoco.set_mju_user_warning(self._before)
-
-
-@contextlib.contextmanager
-def engine_warnings() -> Iterator[list[str]]:
-    """As `EvaluationWarnings`, where models are compiled, too.
-
-    Those of a specification's own ``compile`` come as Python's UserWarning, and are dropped.
-    """
-    with EvaluationWarnings() as collected, warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
-        yield collected
 
 
 def compile_spec(spec: mujoco.MjSpec, file: str) -> mujoco.MjModel:

@@ -18,7 +18,8 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import MotionError
-from workbench.reference.closing import CHAIN, Mechanism, advance, bench
+from workbench.reference.bench import Mechanism, bench
+from workbench.reference.closing import CHAIN, advance
 from workbench.reference.continuation import CORRECTION, LONGEST_STEP, NEGLIGIBLE, SMALLEST_STEP, Assembly, Continuation
 from workbench.reference.engine import Evaluator
 from workbench.reference.kinds import SCALAR

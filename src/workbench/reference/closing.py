@@ -8,112 +8,28 @@ for word; what is reached is a proposal that MuJoCo's own evaluation has to conf
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from workbench.arrays import FloatArray
 from workbench.compiled import compiled, merged
 from workbench.reference.kernels import follow_tangent, integrate, keep_if_better
-from workbench.reference.kinematics import Kinematics, Places, place, room
-from workbench.reference.linear import factor, solved
-from workbench.reference.rows import constraint_rows
-from workbench.reference.sides import NO_SIDES, UNKNOWN, SideTable, same_side, side_of
-from workbench.reference.tables import ClosureTables
+from workbench.reference.kinematics import place
+from workbench.reference.linear import factor, solve, solved
+from workbench.reference.rows import jacobian_rows, residuals
+from workbench.reference.sides import UNKNOWN, same_side, side_of
 
 NEAR, LINES, CHAIN = 0, 1, 2
 """Ways to close samples, see `advance`."""
 
+BESIDE = 1e-2
+"""rad or m: so far from where the loops' Jacobian was factored last its factor is good for a step: positions alone are
+evaluated then."""
 
-class Mechanism(NamedTuple):
-    """All that is known of a model's loops."""
+DRAWN = 1e-2
+"""Part of the residual that such a step may leave; where it leaves more, the Jacobian is factored anew."""
 
-    kinematics: Kinematics
-    closures: ClosureTables
-    joints: tuple[np.ndarray, np.ndarray, np.ndarray]
-    passive: np.ndarray
-    actuated: np.ndarray
-    actuated_qpos: np.ndarray
-    weights: FloatArray
-    """``(nv,)`` what a unit of each velocity counts"""
-    coordinate_weights: FloatArray
-    """``(nq,)``"""
-    sides: SideTable = NO_SIDES
-    """known once the home pose is closed"""
-
-
-class Rules(NamedTuple):
-    """Bounds of `workbench.reference.continuation` and `workbench.reference.tolerance`."""
-
-    closed: float
-    floor: float
-    astray: float
-    settles: bool
-    """loops agree only to some digits: every Newton step counts and the last is kept"""
-    steps: int
-    """Newton steps at most"""
-    correction: float
-    longest: float
-    almost: float
-    negligible: float
-    smallest: float
-    """a smaller part of the way means that the way is blocked"""
-
-
-class Bench(NamedTuple):
-    """Room for the work on one sample."""
-
-    places: Places
-    seen: Places
-    """views of the same that may not be written to, as MuJoCo's own: to kernels another type"""
-    qpos: FloatArray
-    kept: FloatArray
-    predicted: FloatArray
-    here: FloatArray
-    """the closed configuration that a way begins at, and then the last one reached"""
-    tangent: FloatArray
-    tangent_here: FloatArray
-    tangent_before: FloatArray
-    facts: FloatArray
-    """``(4,)`` residual, rank, condition, weakest"""
-    facts_here: FloatArray
-    sides: np.ndarray
-    """``(2,)`` of the last closing, and here: on which side of their singular poses"""
-    jacobian: FloatArray
-    before: FloatArray
-    """``(1, m, nv)``, as `after` and ``same (1,)`` for `same_side`"""
-    after: FloatArray
-    same: np.ndarray
-    work: FloatArray
-    residual: FloatArray
-    a: FloatArray
-    beta: FloatArray
-    order: np.ndarray
-    x: FloatArray
-    step: FloatArray
-    bend: FloatArray
-    """``(nv,)`` added to the first prediction before Newton begins: what the tangent's own change is worth"""
-    best: FloatArray
-    ways: FloatArray
-    """``(4, na)`` the way, where a step leads, its change, and where the way begins"""
-
-
-def bench(mechanism: Mechanism) -> Bench:
-    """Room for one sample of a mechanism. Made by NumPy: compiled, making it takes longer than all that it is for."""
-    m, p, na = int(mechanism.closures.block_rows[-1]), len(mechanism.passive), len(mechanism.actuated)
-    nq, nv = len(mechanism.coordinate_weights), len(mechanism.weights)
-    places = room(mechanism.kinematics, nv)
-    seen = Places(*(array.view() for array in places))
-    for array in seen:
-        array.flags.writeable = False
-    return Bench(
-        places, seen, np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros((nv, na)),
-        np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros(2, dtype=np.int64),
-        np.zeros((m, nv)), np.zeros((1, m, nv)), np.zeros((1, m, nv)), np.zeros(1, dtype=np.bool_),
-        np.zeros((p, p)), np.zeros(m),
-        np.zeros((m, p + na + 1)), np.zeros(p), np.zeros(p, dtype=np.int64), np.zeros(p), np.zeros(nv), np.zeros(nv),
-        np.zeros(1), np.zeros((4, na)),
-    )  # fmt: skip
+ROUNDED = 1e-12
+"""rad or m: a step this short from a closed configuration of a motion leaves rounding, and is not looked at again."""
 
 
 @merged
@@ -148,13 +64,19 @@ def _noted(passive, actuated, a, order, found, x, tangent, facts):  # type: igno
 
 
 @merged
+def _placed(mechanism, w, qpos):  # type: ignore[no-untyped-def]
+    """Evaluate the positions of one configuration, and how far its loops are open: `Bench.residual`."""
+    place(mechanism.kinematics, qpos, w.places)
+    residuals(mechanism.closures, mechanism.joints, qpos, w.seen.site_xpos, w.seen.site_xquat, w.residual)
+
+
+@merged
 def _rows(mechanism, w, qpos, jacobian):  # type: ignore[no-untyped-def]
-    """Evaluate the loops of one configuration: *jacobian* ``(m, nv)``, and their residual in ``Bench.residual``."""
-    kin, seen = mechanism.kinematics, w.seen
-    place(kin, qpos, w.places)
-    constraint_rows(
-        mechanism.closures, mechanism.joints, qpos, seen.cdof, kin.centre, seen.site_xpos, seen.site_xquat,
-        seen.anchors, jacobian, w.residual,
+    """Fill *jacobian* ``(m, nv)`` of the configuration that was placed last."""
+    seen = w.seen
+    jacobian_rows(
+        mechanism.closures, mechanism.joints, qpos, seen.cdof, mechanism.kinematics.centre, seen.site_xpos,
+        seen.anchors, jacobian,
     )  # fmt: skip
 
 
@@ -163,32 +85,53 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     """Newton on the passive joints from `Bench.qpos`, which is overwritten.
 
     The best configuration met goes to `Bench.kept`, its residual to `Bench.facts`; where it is closed, also tangent,
-    rank, condition and weakest freedom.
+    rank, condition and weakest freedom. Near the pose of the last factor, as ``Bench.best[1]`` says, steps are taken
+    with it as long as they converge; facts and tangent are always those of a factor of the closed pose itself.
     """
     passive, actuated, qpos, step, x = mechanism.passive, mechanism.actuated, w.qpos, w.step, w.x
     limits = (rules.closed, rules.floor, rules.astray, rules.settles)
+    beside = w.best[1] <= BESIDE and w.facts[1] == passive.shape[0] and not rules.settles
     w.best[0] = math.inf
     w.sides[0] = UNKNOWN
-    w.facts[1], w.facts[2], w.facts[3] = 0.0, math.inf, 0.0
+    found = np.int64(w.facts[1])
+    w.facts[2], w.facts[3] = math.inf, 0.0
+    for d in range(step.shape[0]):
+        step[d] = w.corrected[0, d] = 0.0
+    chord, last = beside, math.inf
     for _ in range(rules.steps):
-        _rows(mechanism, w, qpos, w.jacobian)
+        _placed(mechanism, w, qpos)
         again, good = keep_if_better(w.residual, limits, qpos, w.kept, w.best, 0)
         if not (again or good):
             break
-        found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order)
-        if good:
-            _noted(passive, actuated, w.a, w.order, found, x, w.tangent, w.facts)
-            if w.sides[0] == UNKNOWN or rules.settles:  # the step to rounding does not change it
-                w.sides[0] = side_of(w.jacobian, found, mechanism.sides, w.work)
-        if not again:
-            break
-        solved(w.a, w.order, found, w.a.shape[1] - 1, x)
-        for j in range(actuated.shape[0]):
-            step[actuated[j]] = 0.0
+        chord = chord and not good and w.best[0] <= DRAWN * last
+        last = w.best[0]
+        if chord:
+            for i in range(w.residual.shape[0]):
+                w.residual[i] = -w.residual[i]
+            solve(w.a, w.beta, w.order, found, w.residual, x)
+        else:
+            _rows(mechanism, w, qpos, w.jacobian)
+            found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order)
+            if good:
+                _noted(passive, actuated, w.a, w.order, found, x, w.tangent, w.facts)
+                if w.sides[0] == UNKNOWN or rules.settles:  # the step to rounding does not change it
+                    w.sides[0] = side_of(w.jacobian, found, mechanism.sides, w.work)
+            if not again:
+                break
+            solved(w.a, w.order, found, w.a.shape[1] - 1, x)
+        longest = 0.0
         for j in range(passive.shape[0]):
             step[passive[j]] = x[j]
+            w.corrected[0, passive[j]] += x[j]
+            longest = max(longest, abs(x[j]))
         integrate(qpos, step, mechanism.joints, qpos)
+        if good and beside and longest <= ROUNDED:
+            _copy(qpos, w.kept)
+            break
     w.facts[0] = w.best[0]
+    if not w.best[0] <= rules.closed:
+        w.facts[1] = 0.0
+    w.best[1] = math.inf
 
 
 @merged
@@ -228,22 +171,25 @@ def _on_side(mechanism, w):  # type: ignore[no-untyped-def]
         return True
     for second in range(2):
         qpos, rows = (w.kept, w.after[0]) if second else (w.here, w.before[0])
+        _placed(mechanism, w, qpos)
         _rows(mechanism, w, qpos, rows)
     same_side(w.before, w.after, table, w.work, w.same)
     return w.same[0]
 
 
 @merged
-def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
+def _follow_line(mechanism, rules, w, target, factored):  # type: ignore[no-untyped-def]
     """Follow the straight line from ``Bench.ways[3]`` to *target* ``(na,)``; returns how much of it was gone, 0 to 1.
 
-    ``Bench.here`` and its like are the closed configuration at the beginning, and then the last one reached.
+    ``Bench.here`` and its like are the closed configuration at the beginning, and then the last one reached;
+    *factored* says whether the last factor was taken there.
     """
     way, aim, change, origin = w.ways[0], w.ways[1], w.ways[2], w.ways[3]
     na = way.shape[0]
     for j in range(na):
         way[j] = target[j] - origin[j]
     done, step = 0.0, 1.0
+    w.best[2] = 0.0
     while done < 1.0:
         follow_tangent(w.tangent_here, way, w.step)
         longest = rules.almost * rules.longest / _length(w.step, mechanism.weights)
@@ -261,6 +207,8 @@ def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
         integrate(w.here, w.step, mechanism.joints, w.qpos)
         for j in range(na):
             w.qpos[mechanism.actuated_qpos[j]] = w.predicted[mechanism.actuated_qpos[j]] = aim[j]
+        w.best[1] = moved if factored else math.inf
+        w.best[2] += 1.0
         close_one(mechanism, rules, w)
         squared = 0.0
         for i in range(w.here.shape[0]):
@@ -274,9 +222,11 @@ def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
             _copy(w.facts, w.facts_here)
             done = 1.0 if last else done + part
             step *= 2.0
+            factored = True
             if longest < rules.smallest and done < 1.0:
                 return done
         else:
+            factored = False
             step = 0.5 * part
             if not step >= rules.smallest:
                 return done
@@ -284,9 +234,12 @@ def _follow_line(mechanism, rules, w, target):  # type: ignore[no-untyped-def]
 
 
 @merged
-def _bend(w, target, s, size):  # type: ignore[no-untyped-def]
-    """Fill `Bench.bend` for the step to sample *s*, after one of length *size* or, for NaN, none; returns it."""
-    na = target.shape[1]
+def _bend(w, target, s, size, known):  # type: ignore[no-untyped-def]
+    """Fill `Bench.bend` for the step to sample *s*, after one of length *size* or, for NaN, none; returns its length.
+
+    The change of the tangent is carried on, and by how much that missed the last *known* samples, at most three.
+    """
+    na, missed = target.shape[1], w.corrected
     longer = 0.0
     for j in range(na):
         longer += (target[s, j] - target[s - 1, j]) ** 2
@@ -296,8 +249,27 @@ def _bend(w, target, s, size):  # type: ignore[no-untyped-def]
         value = 0.0
         for j in range(na):
             value += (w.tangent_here[d, j] - w.tangent_before[d, j]) * (target[s, j] - target[s - 1, j])
-        w.bend[d] = scale * value
+        carried = 0.0
+        if known == 1:
+            carried = missed[1, d]
+        elif known == 2:
+            carried = 2.0 * missed[1, d] - missed[2, d]
+        elif known == 3:
+            carried = 3.0 * (missed[1, d] - missed[2, d]) + missed[3, d]
+        missed[4, d] = carried
+        w.bend[d] = scale * value + carried
     return longer
+
+
+@merged
+def _miss(w, known):  # type: ignore[no-untyped-def]
+    """Note by what the sample was off what was foretold, where one step led to it; returns how many are known."""
+    if w.best[2] > 1.0:
+        return 0
+    for d in range(w.bend.shape[0]):
+        w.corrected[3, d], w.corrected[2, d] = w.corrected[2, d], w.corrected[1, d]
+        w.corrected[1, d] = w.corrected[4, d] + w.corrected[0, d]
+    return min(known + 1, 3)
 
 
 @compiled
@@ -310,16 +282,17 @@ def advance(  # type: ignore[no-untyped-def]
     ``target (n, na)``; the arrays hold the configurations at the start, then those reached, and ``done (n,)`` becomes
     the part of each way that was gone. `CHAIN`: a motion ``target (n, na)``, each sample from the one before, the first
     from the arrays' row before it; Newton begins where the change of the tangent over the step before, carried on,
-    leads, and what is accepted is judged from the tangent alone, as everywhere.
+    leads, with what that missed before, and what is accepted is judged from the tangent alone, as everywhere.
 
     Returns the first sample of a chain that was not reached, else *last*.
     """
-    size = math.nan
+    size, known = math.nan, 0
     for d in range(w.bend.shape[0]):
         w.bend[d] = 0.0
     for s in range(first, last):
         if how == NEAR:
             _copy(start[s], w.qpos)
+            w.best[1] = math.inf
             close_one(mechanism, rules, w)
             _copy(w.kept, w.here)
             _copy(w.facts, w.facts_here)
@@ -339,13 +312,15 @@ def advance(  # type: ignore[no-untyped-def]
                 _copy(start[s], w.ways[3])
             else:
                 _copy(target[s - 1], w.ways[3])
-                size = _bend(w, target, s, size)
+                size = _bend(w, target, s, size, known)
                 _copy_rows(w.tangent_here, w.tangent_before)
-            gone = _follow_line(mechanism, rules, w, target[s])
+            gone = _follow_line(mechanism, rules, w, target[s], how == CHAIN and s > first)
             if how == LINES:
                 done[s] = gone
             elif gone < 1.0:
                 return s
+            else:
+                known = _miss(w, known)
         _copy(w.here, qpos[s])
         _copy_rows(w.tangent_here, tangent[s])
         residual[s], rank[s] = w.facts_here[0], np.int64(w.facts_here[1])

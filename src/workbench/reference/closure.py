@@ -12,7 +12,8 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
 from workbench.reference.along import OrderedClosure
-from workbench.reference.closing import LINES, NEAR, Mechanism, advance, bench
+from workbench.reference.bench import Mechanism, bench
+from workbench.reference.closing import LINES, NEAR, advance
 from workbench.reference.continuation import NEWTON_STEPS, SMALLEST_STEP, Assembly
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import integrate, newton_step

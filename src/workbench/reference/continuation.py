@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.reference.closing import Rules
+from workbench.reference.bench import Rules
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import predict
 from workbench.reference.sides import NO_SIDES, UNKNOWN, SideTable, same_side, side_at, side_table

@@ -24,7 +24,7 @@ from mujoco.batch import Batch
 
 from workbench.arrays import FloatArray
 from workbench.errors import ArrayError, MotionError
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.engine_warnings import engine_warnings
 from workbench.reference.mujoco_reference import MujocoReference
 
 COARSE_STEPS = 1000

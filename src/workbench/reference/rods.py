@@ -28,6 +28,10 @@ LOPSIDED = 0.02
 """As `ROUND`: up to here a rod counts as made for a body of revolution, with the digits of a CAD file and a hole or a
 flat; what the difference is worth in torque is computed. Beyond, it is another body."""
 
+BALL, HINGE, FREE = (
+    kind.value for kind in (mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_FREE)
+)
+
 CLEARLY = 0.1
 """Of `ROUND`: a rod that is rounder than this needs no closer look."""
 
@@ -69,37 +73,40 @@ class Unevenness:
 
 def idle_rods(model: mujoco.MjModel, blocks: list[Block]) -> list[Rod]:
     """All groups of bodies that two spherical joints hold and nothing else."""
-    first = _groups(model)
+    parents, joints = model.body_parentid.tolist(), model.body_jntnum.tolist()
+    first = _groups(parents, joints)
     rods = []
     for body in range(1, model.nbody):
-        if first[body] != body or not model.body_jntnum[body]:
+        if first[body] != body or not joints[body]:
             continue
-        group = tuple(int(b) for b in np.flatnonzero(first == body))
-        points = _held_by(model, blocks, group, body)
+        group = tuple(other for other, leader in enumerate(first) if leader == body)
+        points = _held_by(model, blocks, group, body, parents)
         if points is not None and len(points) == 2:
             rods.append(Rod(body, group, points[0], points[1]))
     return rods
 
 
-def _groups(model: mujoco.MjModel) -> np.ndarray:
-    """The first body of the group that each body is welded into by the tree, ``(nbody,)``."""
-    first = np.arange(model.nbody)
-    for body in range(1, model.nbody):
-        if not model.body_jntnum[body]:
-            first[body] = first[model.body_parentid[body]]
+def _groups(parents: list[int], joints: list[int]) -> list[int]:
+    """The first body of the group that each body is welded into by the tree."""
+    first = list(range(len(parents)))
+    for body in range(1, len(parents)):
+        if not joints[body]:
+            first[body] = first[parents[body]]
     return first
 
 
-def _held_by(model: mujoco.MjModel, blocks: list[Block], group: tuple[int, ...], body: int) -> list[int] | None:
+def _held_by(
+    model: mujoco.MjModel, blocks: list[Block], group: tuple[int, ...], body: int, parents: list[int]
+) -> list[int] | None:
     """Centres of the spherical joints that hold a group; None where something else holds it as well."""
     points = []
     own = _spherical(model, body)
     if own is not None:
         points.append(own)
-    elif mujoco.mjtJoint(model.jnt_type[model.body_jntadr[body]]) != mujoco.mjtJoint.mjJNT_FREE:
+    elif model.jnt_type[model.body_jntadr[body]] != FREE:
         return None
     for child in range(1, model.nbody):
-        if child not in group and model.body_parentid[child] in group:
+        if child not in group and parents[child] in group:
             centre = _spherical(model, child)
             if centre is None:
                 return None
@@ -118,10 +125,10 @@ def _held_by(model: mujoco.MjModel, blocks: list[Block], group: tuple[int, ...],
 def _spherical(model: mujoco.MjModel, body: int) -> int | None:
     """The centre of the spherical joint between a body and its parent; None where there is another joint."""
     start, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-    kinds = [mujoco.mjtJoint(kind) for kind in model.jnt_type[start : start + count]]
-    if kinds == [mujoco.mjtJoint.mjJNT_BALL]:
+    kinds = model.jnt_type[start : start + count].tolist()
+    if kinds == [BALL]:
         return -1 - start
-    if kinds == [mujoco.mjtJoint.mjJNT_HINGE] * 3:
+    if kinds == [HINGE] * 3:
         joints = slice(start, start + 3)
         together = np.ptp(np.array(model.jnt_pos[joints]), axis=0).max() == 0.0
         if together and abs(np.linalg.det(np.array(model.jnt_axis[joints]))) > COPLANAR:

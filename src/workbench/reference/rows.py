@@ -49,32 +49,66 @@ def _end(site_xpos, anchors, point, i):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def constraint_rows(closures, joints, qpos, cdof, com, site_xpos, site_xquat, anchors, jac, res):  # type: ignore[no-untyped-def]
-    """Fill the constraint Jacobian ``(m, nv)`` and residual ``(m,)`` of one sample."""
+def residuals(closures, joints, qpos, site_xpos, site_xquat, res):  # type: ignore[no-untyped-def]
+    """Fill the residual ``(m,)`` of one sample: how far its loops are open, m and rad."""
+    blocks, block_rows, polynomials, tendons = (
+        closures.blocks, closures.block_rows, closures.polynomials, closures.tendons
+    )  # fmt: skip
+    _kinds, qpos_of, _dof_of = joints
+    for k in range(blocks.shape[0]):
+        kind, s1, s2, row = blocks[k, 0], blocks[k, 3], blocks[k, 4], block_rows[k]
+        if kind in (CONNECT, WELD):
+            for i in range(3):
+                res[row + i] = site_xpos[s1, i] - site_xpos[s2, i]
+            if kind == WELD:
+                _relative_turn(site_xquat[s1], site_xquat[s2], res, row + 3)
+        elif kind == JOINT:
+            y = qpos[qpos_of[s2]] if s2 >= 0 else 0.0
+            res[row] = qpos[qpos_of[s1]] - _polynomial(polynomials[k], y)
+        elif kind == SPIN:
+            res[row] = 0.0
+        elif kind == TENDON:
+            y, z = 0.0, 0.0
+            for j in range(tendons.shape[1]):
+                if tendons[s1, j] != 0.0:
+                    z += tendons[s1, j] * qpos[qpos_of[j]]
+                if s2 >= 0 and tendons[s2, j] != 0.0:
+                    y += tendons[s2, j] * qpos[qpos_of[j]]
+            res[row] = z - _polynomial(polynomials[k], y)
+
+
+@inlined
+def _polynomial(c, y):  # type: ignore[no-untyped-def]
+    return c[0] + y * (c[1] + y * (c[2] + y * (c[3] + y * c[4])))
+
+
+@inlined
+def _slope(c, y):  # type: ignore[no-untyped-def]
+    return c[1] + y * (2.0 * c[2] + y * (3.0 * c[3] + y * 4.0 * c[4]))
+
+
+@compiled
+def jacobian_rows(closures, joints, qpos, cdof, com, site_xpos, anchors, jac):  # type: ignore[no-untyped-def]
+    """Fill the constraint Jacobian ``(m, nv)`` of one sample."""
     blocks, block_rows, polynomials = closures.blocks, closures.block_rows, closures.polynomials
     root, moving, depth, tendons = closures.root, closures.moving, closures.depth, closures.tendons
     _kinds, qpos_of, dof_of = joints
-    jac[:, :] = 0.0
-    res[:] = 0.0
+    for i in range(jac.shape[0]):
+        for d in range(jac.shape[1]):
+            jac[i, d] = 0.0
     for k in range(blocks.shape[0]):
         kind, b1, b2, s1, s2 = blocks[k, 0], blocks[k, 1], blocks[k, 2], blocks[k, 3], blocks[k, 4]
         row = block_rows[k]
         if kind in (CONNECT, WELD):
             point_rows(cdof, com[root[b1]], moving, depth, b1, site_xpos[s1], 1.0, row, jac)
             point_rows(cdof, com[root[b2]], moving, depth, b2, site_xpos[s2], -1.0, row, jac)
-            for i in range(3):
-                res[row + i] = site_xpos[s1, i] - site_xpos[s2, i]
             if kind == WELD:
                 _turn_rows(cdof, moving, depth, b1, 1.0, row + 3, jac)
                 _turn_rows(cdof, moving, depth, b2, -1.0, row + 3, jac)
-                _relative_turn(site_xquat[s1], site_xquat[s2], res, row + 3)
         elif kind == JOINT:
-            c = polynomials[k]
-            y = qpos[qpos_of[s2]] if s2 >= 0 else 0.0
             jac[row, dof_of[s1]] = 1.0
-            res[row] = qpos[qpos_of[s1]] - (c[0] + y * (c[1] + y * (c[2] + y * (c[3] + y * c[4]))))
             if s2 >= 0:
-                jac[row, dof_of[s2]] = -(c[1] + y * (2.0 * c[2] + y * (3.0 * c[3] + y * 4.0 * c[4])))
+                jac[row, dof_of[s2]] = -_slope(polynomials[k], qpos[qpos_of[s2]])
         elif kind == SPIN:
             # the rod's axis runs from its near end to its far end; scaled by the length, so that rows are metres
             for j in range(depth[b1]):
@@ -84,20 +118,24 @@ def constraint_rows(closures, joints, qpos, cdof, com, site_xpos, site_xquat, an
                     s += cdof[d, i] * (_end(site_xpos, anchors, s1, i) - _end(site_xpos, anchors, s2, i))
                 jac[row, d] = s
         elif kind == TENDON:
-            c = polynomials[k]
             y = 0.0
             if s2 >= 0:
                 for j in range(tendons.shape[1]):
                     if tendons[s2, j] != 0.0:
                         y += tendons[s2, j] * qpos[qpos_of[j]]
-            slope = c[1] + y * (2.0 * c[2] + y * (3.0 * c[3] + y * 4.0 * c[4]))
-            res[row] = -(c[0] + y * (c[1] + y * (c[2] + y * (c[3] + y * c[4]))))
+            slope = _slope(polynomials[k], y)
             for j in range(tendons.shape[1]):
                 if tendons[s1, j] != 0.0:
-                    res[row] += tendons[s1, j] * qpos[qpos_of[j]]
                     jac[row, dof_of[j]] += tendons[s1, j]
                 if s2 >= 0 and tendons[s2, j] != 0.0:
                     jac[row, dof_of[j]] -= slope * tendons[s2, j]
+
+
+@compiled
+def constraint_rows(closures, joints, qpos, cdof, com, site_xpos, site_xquat, anchors, jac, res):  # type: ignore[no-untyped-def]
+    """Fill the constraint Jacobian ``(m, nv)`` and residual ``(m,)`` of one sample."""
+    residuals(closures, joints, qpos, site_xpos, site_xquat, res)
+    jacobian_rows(closures, joints, qpos, cdof, com, site_xpos, anchors, jac)
 
 
 @inlined

@@ -29,7 +29,7 @@ from workbench.mjcf.same_robot import check_same_robot
 from workbench.mjcf.setup import Setup, plan, start
 from workbench.mjcf.source import Source, read_source
 from workbench.mjcf.text import Element, scan, tokens, written
-from workbench.robots.number_checks import NumberChecks, Products
+from workbench.robots.number_checks import Products
 from workbench.robots.parameters import Target
 from workbench.robots.places import WHOLE
 from workbench.robots.values import quotient, read_parameters, rewrite, vector
@@ -182,7 +182,8 @@ class _Kept:
         whole = dataclasses.replace(prepared, preparation=None)
         self._user = _Numbers(base, whole.spec())
         self._own = _Numbers(base, prepared.spec()) if prepared.preparation else None
-        self._checks = NumberChecks(base.model, base.loaded.description, self._file, base.computed)
+        assert base.checks is not None
+        self._checks = base.checks
         self._table = base.loaded.description.table
         self._computed = sorted(base.computed.values(), key=lambda target: len(target.of))
 
@@ -243,7 +244,7 @@ def _text(base: Base, wanted: Mapping[str, float]) -> str:
     loaded = base.loaded
     assert loaded.description is not None
     assert loaded.values is not None
-    return rewrite(base.model, loaded.text, loaded.file, loaded.description, loaded.values, wanted, base.elements)
+    return rewrite(base.model, loaded.text, loaded.file, loaded.description, loaded.values, wanted, base.elements)[0]
 
 
 def _source(base: Base, text: Callable[[], str]) -> Source:
@@ -253,7 +254,7 @@ def _source(base: Base, text: Callable[[], str]) -> Source:
 def _kept(base: Base) -> _Kept | None:
     """A specification that was shown to compile to what the text compiles to; None where it does not."""
     loaded = base.loaded
-    if loaded.description is None or loaded.values is None or loaded.prepared is None:
+    if loaded.description is None or loaded.values is None or loaded.prepared is None or base.checks is None:
         return None
     noted = loaded.prepared.notes[: len(loaded.prepared.notes) - len(_moved(loaded.prepared))]
     if noted or loaded.prepared.source.missing:  # options of the compiler, files that are not read
