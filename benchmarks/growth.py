@@ -9,11 +9,14 @@ beyond that of the smallest one stands beside. Prints tables in Markdown.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
+import os
 import resource
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -29,8 +32,8 @@ SIZES: dict[str, tuple[int, ...]] = {
     "samples": (101, 501, 2001, 8001),
     "legs": (6, 8, 10, 12),
     "candidates": (1, 2, 4, 8),
-    "cases": (24, 48, 96),
-    "workers": (1, 2),
+    "cases": (100, 300, 1000, 3000),
+    "cases by two workers": (100, 300, 1000, 3000),
 }
 QUICK = {
     "joints": (6, 15),
@@ -38,9 +41,9 @@ QUICK = {
     "legs": (6, 8),
     "candidates": (1, 2),
     "cases": (6, 12),
-    "workers": (1,),
+    "cases by two workers": (6, 12),
 }
-MOST = {"joints": 3.0, "samples": 1.1, "legs": 3.0, "candidates": 1.1, "cases": 1.1}
+MOST = {"joints": 3.0, "samples": 1.1, "legs": 3.0, "candidates": 1.1, "cases": 1.1, "cases by two workers": 1.1}
 """Exponents that are no more than they have to be."""
 
 
@@ -94,36 +97,45 @@ def candidates_seconds(count: int) -> float:
     return least(lambda _: compute_case(wanted, case, Effort.of_many()))
 
 
-def cases_seconds(count: int) -> float:
-    """So many cases of the design sweep, in this process."""
+def sweep_seconds(count: int, jobs: int) -> float:
+    """A sweep of so many cases of the design sweep, in full: CPU of this process, which writes, and of its workers."""
     from workbench.campaign.evidence import Effort
     from workbench.campaign.spec import load_campaign
-    from workbench.sweep.evaluate import Context
-    from workbench.sweep.identity import common_key
-    from workbench.sweep.plan import plan_sweep
-    from workbench.sweep.run import task_of
+    from workbench.sweep.run import SweepOptions, run_sweep
 
-    file = ROOT / "campaigns" / "design_sweep.toml"
-    campaign = load_campaign(file)[0]
-    assert campaign.sweep is not None
-    effort = Effort.of_many(("mujoco",), campaign.sweep.budget)
-    plan = plan_sweep(campaign, file, None, {})
-    common = common_key(campaign, file, plan.model, {}, effort, campaign.sweep.keep_series)
-    compute = Context(campaign, file, plan.model, {}, effort, plan.recipe, common).setup()
-    return least(lambda call: [compute(task_of(plan, 100 * call + index)) for index in range(count)])
-
-
-def workers_seconds(count: int) -> float:
-    """A sweep of 96 cases by so many workers: CPU of all processes, workers' start included."""
     text = (ROOT / "campaigns" / "design_sweep.toml").read_text()
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "sweep.toml"
-        file.write_text(text.replace("samples = 10000", "samples = 96"))
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        command = ["run", str(file), "--jobs", str(count), "--out", str(Path(folder) / "out")]
-        subprocess.run([sys.executable, "-m", "workbench", *command], check=True, capture_output=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        file.write_text(text.replace("samples = 10000", f"samples = {count}"))
+        campaign = load_campaign(file)[0]
+        threading.Thread(target=watch_workers, daemon=True).start()
+        before = cpu_seconds()
+        run_sweep(campaign, file, Path(folder) / "out", effort=Effort.of_many(), options=SweepOptions(jobs=jobs))
+        return cpu_seconds() - before
+
+
+WORKERS = [0.0]
+"""peak memory in MB of workers that this process began"""
+
+
+def watch_workers() -> None:
+    """Add to `WORKERS`; what the system says at the end counts a worker as large as this process was before it."""
+    children = Path(f"/proc/self/task/{os.getpid()}/children")
+    while True:
+        for pid in children.read_text().split():
+            with contextlib.suppress(OSError, StopIteration):  # it is gone
+                lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+                peak = next(line for line in lines if line.startswith("VmHWM"))
+                command = Path(f"/proc/{pid}/cmdline").read_bytes()
+                if b"workbench.sweep.worker" in command:
+                    WORKERS.append(int(peak.split()[1]) / 1024)
+        time.sleep(0.05)
+
+
+def cpu_seconds() -> float:
+    """CPU of this process and of those that it has ended."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 MEASURES: dict[str, Callable[[int], float]] = {
@@ -131,18 +143,18 @@ MEASURES: dict[str, Callable[[int], float]] = {
     "samples": lambda n: reference_seconds(machines.tower(3), n),
     "legs": lambda n: reference_seconds(machines.stewart(n), 501),
     "candidates": candidates_seconds,
-    "cases": cases_seconds,
-    "workers": workers_seconds,
+    "cases": lambda n: sweep_seconds(n, 1),
+    "cases by two workers": lambda n: sweep_seconds(n, 2),
 }
 
 
-def measured(what: str, size: int) -> tuple[float, float]:
-    """CPU seconds and peak memory, MB, in a process of its own."""
+def measured(what: str, size: int) -> tuple[float, float, float]:
+    """CPU seconds, and peak memory, MB, of a process of its own and of the largest that it began."""
     run = subprocess.run(
         [sys.executable, __file__, "--one", what, str(size)], check=True, capture_output=True, text=True
     )
-    seconds, memory = json.loads(run.stdout)
-    return float(seconds), float(memory)
+    seconds, memory, worker = json.loads(run.stdout)
+    return float(seconds), float(memory), float(worker)
 
 
 def exponent(sizes: tuple[int, ...], values: list[float]) -> float:
@@ -150,16 +162,16 @@ def exponent(sizes: tuple[int, ...], values: list[float]) -> float:
     return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
 
 
-def draw(found: dict[str, list[tuple[float, float]]], sizes: dict[str, tuple[int, ...]], path: Path) -> None:
+def draw(found: dict[str, list[tuple[float, float, float]]], sizes: dict[str, tuple[int, ...]], path: Path) -> None:
     """All series over their sizes, both as multiples of the smallest."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.0))
     axes = figure.add_subplot()
     for what, rows in found.items():
-        if len(rows) < 2 or what == "workers":
+        if len(rows) < 2:
             continue
-        x, y = np.array(sizes[what]) / sizes[what][0], np.array([seconds for seconds, _ in rows]) / rows[0][0]
+        x, y = np.array(sizes[what]) / sizes[what][0], np.array([row[0] for row in rows]) / rows[0][0]
         axes.loglog(x, y, "o-", label=f"{what} from {sizes[what][0]}")
     reach = np.array(axes.get_xlim())
     for power in (1, 2, 3):
@@ -179,19 +191,21 @@ def main() -> None:
     given = parser.parse_args()
     if given.one:
         seconds = MEASURES[given.one[0]](int(given.one[1]))
-        print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
+        print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, max(WORKERS)]))
         return
     sizes = QUICK if given.quick else SIZES
-    found: dict[str, list[tuple[float, float]]] = {}
+    found: dict[str, list[tuple[float, float, float]]] = {}
     for what in given.only:
         found[what] = [measured(what, size) for size in sizes[what]]
         print(f"\n| {what} | " + " | ".join(map(str, sizes[what])) + " | exponent |")
         print("|---" * (len(sizes[what]) + 2) + "|")
-        seconds, memory = zip(*found[what], strict=True)
+        seconds, memory, worker = zip(*found[what], strict=True)
         fit = f"{exponent(sizes[what], list(seconds)):.2f}" if len(seconds) > 1 else ""
         note = "" if not fit or what not in MOST or float(fit) <= MOST[what] else f" (more than {MOST[what]:g})"
         print("| CPU, ms | " + " | ".join(f"{1e3 * value:.3g}" for value in seconds) + f" | {fit}{note} |")
         print("| peak memory, MB | " + " | ".join(f"{value:.0f}" for value in memory) + " | |", flush=True)
+        if any(worker):
+            print("| of a worker, MB | " + " | ".join(f"{value:.0f}" for value in worker) + " | |", flush=True)
     if given.figure:
         draw(found, sizes, given.figure)
 

@@ -19,7 +19,7 @@ PACKAGE = "workbench"
 MAX_LINES = 400
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("__main__", "cli", "commands", "console"),
+    ("__main__", "cli", "commands", "console", "terminal"),
     ("studio",),
     ("report", "compare", "rendering"),
     ("control",),

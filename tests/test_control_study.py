@@ -296,7 +296,7 @@ controller = "computed torque"
 
 
 def test_what_a_study_found_stands_in_its_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("workbench.control.run.Supervisor", InThisProcess)
+    monkeypatch.setattr("workbench.sweep.computing.Supervisor", InThisProcess)
     rates = ("rates = [500.0]", "rates = [250.0, 500.0]\nspeeds = [0.5, 1.0]")
     path = write(tmp_path, rates, ("bandwidths = [10.0]", "bandwidths = [10.0, 300.0]"), more=CLAIM)
     out = tmp_path / "out"
@@ -312,6 +312,9 @@ def test_what_a_study_found_stands_in_its_report(tmp_path: Path, monkeypatch: py
     ):  # fmt: skip
         assert said in report, said
     assert list((out / "figures").glob("figure-control-rate-*.svg"))
+    assert {path.stem for path in (out / "figures").glob("figure-control-gap-*.svg")} == {
+        "figure-control-gap-rate-swing", "figure-control-gap-speed-swing",
+    }  # fmt: skip
     assert "<script" in (out / "report.html").read_text(encoding="utf-8")
     # the same again computes nothing; a reader of cases is told where to look
     assert run_study(*load_campaign(path), out).manifest["computed"] == 0

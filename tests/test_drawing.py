@@ -109,6 +109,24 @@ def test_a_report_loads_no_engine(module: str) -> None:
     assert done.stdout.split() == []
 
 
+def test_the_command_loads_no_engine_either(tmp_path: Path) -> None:
+    code = """
+import pathlib, sys
+from workbench.commands.report import report
+from workbench.errors import WorkbenchError
+try:
+    report(pathlib.Path(sys.argv[1]), ["pdf"])
+except WorkbenchError as error:
+    print(error, file=sys.stderr)
+print(*[m for m in ("mujoco", "numba", "scipy", "pandas") if m in sys.modules])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert "manifest.json" in done.stderr
+    assert done.stdout.split() == []
+
+
 def test_an_empty_group_is_none_that_is_opened() -> None:
     inner = '<g clip-path="url(#a)"/>\n<g style="x: y">\n<path d="M 0 0"/>\n</g>'
     root = ElementTree.fromstring(compact(f'<svg viewBox="0 0 1 1">\n<g>\n{inner}\n</g>\n</svg>\n', "key"))

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
 from workbench.errors import ModelError
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
+from workbench.reference.closures import read_closures
+from workbench.reference.frames import Frames
 from workbench.reference.left_open import left_open
+from workbench.reference.rods import ROUND, RodFrame, idle_rods
 
 HEAD = '<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"><flag contact="disable"/></option><worldbody>'
 CRANK = (
@@ -140,3 +144,21 @@ def test_a_platform_rides_on_no_idle_spin(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace('<site name="off"/>', '<site name="off" pos="0 0 .1"/>'))
     with pytest.raises(ModelError, match='platform site "off" lies'):
         MujocoReference(path, setup=Setup(("crank",), "off"))
+
+
+def test_what_is_plainly_round_is_round_by_the_closer_look_too() -> None:
+    """Rods off by parts of `ROUND`, mass centre or inertia: the quick look never passes what the other refuses."""
+    plainly, closely = [], []
+    for off in (0.0, 1e-9, 3e-8, 2e-7, 1.1e-6, 1e-3):
+        for shift, inertia in (((off, -off), "1e-3 1e-3"), ((0.0, 0.0), f"1e-3 {1e-3 * (1 + off):.17g}")):
+            mass = f'<inertial mass=".2" pos=".1 {shift[0]:.17g} {shift[1]:.17g}" diaginertia="1e-5 {inertia}"/>'
+            text = rod(mass=mass, inside='<site name="end" pos=".3 0 0"/>')
+            model = mujoco.MjModel.from_xml_string(text)
+            closures = read_closures(model)
+            (one,) = idle_rods(model, closures.blocks)
+            shape = RodFrame(model, one, Frames.of(closures.frames))
+            plainly.append(shape.plainly_round())
+            closely.append(not shape.unevenness().beyond(ROUND))
+    assert all(close for plain, close in zip(plainly, closely, strict=True) if plain)
+    assert plainly[:4] == [True] * 4
+    assert closely[-2:] == [False] * 2

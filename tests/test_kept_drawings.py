@@ -8,9 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from matplotlib.axes import Axes
 
 from test_report import make_run
-from workbench.report import build, kept_drawings, svg
+from workbench.report import build, kept_drawings, layout, svg
 from workbench.report.build import build_report
 from workbench.report.layout import log_axis, stack
 from workbench.report.style import figure_style
@@ -112,6 +113,8 @@ def test_an_axis_draws_what_matplotlib_draws(monkeypatch: pytest.MonkeyPatch) ->
         below.plot([0.0, 0.3, 1.0], [1e-9, 1e-3, 1e-6])
         log_axis(below, 1e-9, 1e-3)
         above.set_ylabel("τ1 [N]")
+        below.tick_params(axis="x", labelsize=6, length=4)
+        below.grid(axis="y", visible=False)
         free = figure.add_axes((0.6, 0.6, 0.2, 0.2))
         free.plot([1, 2], [3, 4])
         free.set_ylabel("placed by its ticks")
@@ -119,5 +122,8 @@ def test_an_axis_draws_what_matplotlib_draws(monkeypatch: pytest.MonkeyPatch) ->
 
     with figure_style():
         light = drawn()
-        monkeypatch.setattr(svg, "lighten", lambda figure: None)
+        with monkeypatch.context() as patched:
+            patched.setattr(svg, "lighten", lambda figure: None)
+            assert light == drawn()
+        monkeypatch.setattr(layout, "LightAxes", Axes)
         assert light == drawn()

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from workbench.metrics import POINTWISE_FLOOR, JointError, relative_error
+from workbench.metrics import POINTWISE_FLOOR, JointError, relative_error, relative_errors
 
 SAME = 1e-14
 
@@ -103,3 +103,18 @@ def test_errors_are_fractions_of_the_joints_own_force(factor: float) -> None:
     one, other = relative_error(candidate, reference), relative_error(factor * candidate, factor * reference)
     for read in ERRORS:
         assert read(other) == pytest.approx(read(one), rel=1e-12)
+
+
+def test_columns_are_judged_as_each_by_itself_bit_for_bit() -> None:
+    columns = [series(seed) for seed in range(4)]
+    zero, gap = np.zeros(200), columns[0][0].copy()
+    gap[7] = np.nan
+    columns += [(zero, zero), (columns[1][0], zero), (gap, columns[0][1])]
+    candidates, references = (np.column_stack(arrays) for arrays in zip(*columns, strict=True))
+    found = relative_errors(candidates, references)
+    alone = [relative_error(*column) for column in columns]
+    assert list(map(repr, found)) == list(map(repr, alone))
+    assert [error.peak_error for error in found[4:6]] == [0.0, math.inf]
+    assert math.isnan(found[6].peak_error)
+    # a column that took its neighbour's peak would be another
+    assert len({error.peak_reference for error in found[:4]}) == 4

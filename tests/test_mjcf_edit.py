@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from robots import peak_error
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, OutputError, ParameterError, WorkbenchError
-from workbench.mjcf.text import Edit, find, replace_numbers, scan, tokens
+from workbench.mjcf.text import Edit, find, numbers_replaced, replace_numbers, scan, tokens
 from workbench.robots.assignments import parse_assignment, resolve_changes
 from workbench.robots.edit import edit_file, resolve_for
 from workbench.robots.load import LoadedModel, load_model
@@ -413,3 +413,19 @@ def test_a_body_is_found_by_its_only_geom() -> None:
     text = '<mujoco><worldbody><body name="arm"><geom size="1 2" mass="3"/></body></worldbody></mujoco>'
     edits = [Edit("geom", "arm", "size", 1, 4.0), Edit("inertial", "arm", "mass", 0, 5.0)]
     assert replace_numbers(text, "m.xml", edits) == text.replace('"1 2"', '"1 4"').replace('"3"', '"5"')
+
+
+@pytest.mark.parametrize("mark", ["", "<!-- Länge, 长度 -->"])
+def test_elements_of_an_edited_text_are_those_that_a_scan_of_it_finds(mark: str) -> None:
+    """Numbers that become longer and shorter, before, in and behind elements that hold others."""
+    text = mark.join(ASYM.read_text().partition("<worldbody>")).replace(mark, "", 1)
+    elements = scan(text, "m")
+    named = [e for e in elements if e.tag in ("body", "site") and e.section == "worldbody" and e.name]
+    placed = [e for e in named if len(tokens(text, e, "pos")) == 3]
+    edits = [Edit(e.tag, e.name, "pos", i % 3, (-1.0) ** i * 1.0 / (i + 3.0)) for i, e in enumerate(placed)]
+    edits += [Edit(placed[0].tag, placed[0].name, "pos", 2, 0.0)]
+    changed, moved = numbers_replaced(text, "m", edits, elements)
+    assert len(placed) > 10
+    assert moved == scan(changed, "m")
+    # and that is something: without moving them they are others
+    assert elements != scan(changed, "m")

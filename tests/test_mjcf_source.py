@@ -264,3 +264,18 @@ def test_a_model_with_an_include_is_read_again(tmp_path: Path) -> None:
         body = f'<body><joint/><geom size="1" mass="{mass}"/></body>'
         part.write_text(f"<mujocoinclude><worldbody>{body}</worldbody></mujocoinclude>")
         assert load.load_model(model).model.body_mass[1] == mass
+
+
+def test_what_is_attached_counts_as_often_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("workbench.mjcf.source.MAX_ELEMENTS", 60)
+    body = f'<body name="b"><joint/><geom size="1"/>{"<site/>" * 12}</body>'
+    write(tmp_path, part_xml=f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+
+    def text(times: int) -> str:
+        attached = "".join(f'<frame><attach model="p" body="b" prefix="{i}"/></frame>' for i in range(times))
+        model = '<asset><model name="p" file="part.xml"/></asset>'
+        return f"<mujoco>{model}<worldbody>{attached}</worldbody></mujoco>"
+
+    assert "part.xml" in str(read_source(text(1), "m", tmp_path).files)
+    with pytest.raises(ModelError, match=r"m:1: <attach> makes more than 60 elements, copies counted"):
+        read_source(text(3), "m", tmp_path)

@@ -67,9 +67,13 @@ def test_show_lists_every_parameter_with_its_place(workbench: Workbench, model: 
     for entry, row in zip(shown, rows, strict=True):
         assert entry["value"] == row.value
         assert entry["unit"] == row.unit
-        assert entry["element"]
         assert row.meaning == entry["meaning"]
         line = model.read_text().split("\n")[entry["line"] - 1]
+        tag, _, owner = entry["element"].partition(" of ")  # what has no name of its own is its body's
+        named = [tag] if owner else tag.split(" ", 1)
+        assert f"<{named[0]} " in line
+        assert ('name="' in line) == (not owner and named[0] != "option"), entry
+        assert named[1:] == re.findall(r'<\w+ name="([^"]*)"', line)
         assert f"{entry['attribute'].partition('[')[0]}=" in line
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ast
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from mutants import modules
+from mutants import __main__ as command
+from mutants import modules, short, trial
 from mutants.named import EQUIVALENT, NAMED
 from mutants.operators import OPERATORS, compiles, mutants_of
 from mutants.tree import source_of
@@ -83,3 +86,64 @@ def test_groups_hold_files_and_core_tests_exist(repository: Path) -> None:
         assert modules.files_of(group), group
     missing = [name for name in modules.CORE_TESTS if not (repository / modules.test_file(name)).exists()]
     assert not missing
+
+
+def test_a_short_run_begins_with_what_is_quick_and_leaves_out_what_fails_by_itself(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    without_fault = {
+        "a.py": (
+            {"a.py::slow": 2.0, "a.py::slowest": 9.0, "a.py::quick": 0.2, "a.py::quicker": 0.1, "a.py::broken": 0.0},
+            ["a.py::broken"],
+        ),
+        "b.py": ({"b.py::quick": 0.05, "b.py::slow": 1.0}, []),
+    }
+    monkeypatch.setattr(short, "_without_fault", lambda file, uncompiled: without_fault[file])
+    tests, total, failing = short.tests_of(("a.py", "b.py"), uncompiled=False)
+    assert tests == ["a.py::quicker", "a.py::quick", "b.py::quick", "a.py::slow", "b.py::slow"]
+    assert total == pytest.approx(3.35)
+    assert failing == ["a.py::broken"]
+
+
+def test_a_fault_that_no_test_could_notice_is_not_tried_and_not_counted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("a fault was planted that nothing could notice")
+
+    monkeypatch.setattr(short, "_without_fault", lambda file, uncompiled: ({f"{file}::test": 1.0}, [f"{file}::test"]))
+    monkeypatch.setattr(trial, "trial", never)
+    module = "metrics.py"
+    planted = [command.Planted("metrics", module, one) for one in mutants_of(source_of(module))[:3]]
+    outcome, tried = command._try(planted[0], 60.0, ["tests/test_metrics.py"])
+    assert (outcome.status, tried) == (trial.BROKEN, 0)
+    assert "tests/test_metrics.py::test" in outcome.by
+    states = [trial.BROKEN, trial.KILLED, trial.KILLED]
+    known: dict[str, dict[str, object]] = {
+        one.key: {"status": status} for one, status in zip(planted, states, strict=True)
+    }
+    assert command._summary(planted, known) == 2  # not 0: nobody knows
+    said = capsys.readouterr().out
+    assert "metrics: 2 of 2 noticed (100%; of all faults 34% to 100%), 1 not tried" in said
+    assert f"not tried: metrics  {module}:{planted[0].mutant.line}" in said
+    known[planted[0].key]["status"] = trial.SURVIVED
+    assert command._summary(planted, known) == 1
+
+
+def test_the_references_kernels_divide_by_zero_uncompiled_as_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    from types import FunctionType
+
+    from workbench import compiled
+
+    for name in ("compiled", "inlined", "merged"):
+        monkeypatch.setattr(compiled, name, getattr(compiled, name))
+    monkeypatch.setattr("numpy.seterr", lambda **_: None)
+    trial.interpret()
+    scope = {"math": math, "__name__": "workbench.reference.of_a_test"}
+    exec("def kernel(x):\n    return 1.0 / math.sqrt(x)", scope)
+    kernel = scope["kernel"]
+    assert isinstance(kernel, FunctionType)
+    with np.errstate(all="ignore"):
+        assert compiled.compiled(kernel) is kernel
+        assert kernel(0.0) == math.inf
+        assert kernel(4.0) == 0.5

@@ -239,10 +239,16 @@ def test_an_unstable_motion_is_replayed_only_as_long_as_it_says_something(tmp_pa
     assert standing.replays[replay.REFERENCE].verdict == "converges"
 
 
+@pytest.mark.parametrize("threads", [1, 2])
 def test_a_lost_replay_is_a_verdict_and_leaves_no_log(
-    asym: wb.MujocoReference, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    asym: wb.MujocoReference,
+    threads: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(asym, "threads", threads)
     torques: dict[str, replay.TorqueAt] = {
         "nan": lambda q, qd, qdd: np.full_like(q, np.nan),
         "huge": lambda q, qd, qdd: np.full_like(q, 1e9),
@@ -258,6 +264,22 @@ def test_a_lost_replay_is_a_verdict_and_leaves_no_log(
         replay.replay(asym, at(SIMULATION_1), {}, 0.0, 0.0)
     with pytest.raises(ArrayError, match="constant vector"):
         replay.replay(asym, at(SIMULATION_1), {}, 0.0, 0.1, np.zeros((5, 3)))
+
+
+def test_threads_change_no_bit_of_the_evidence(asym: wb.MujocoReference, closed_form: wb.Robot) -> None:
+    def gathered() -> tuple[np.ndarray, ...]:
+        found = replay.replay(asym, at(SIMULATION_1), torques_of(closed_form), 0.0, 0.1)
+        t = np.linspace(0.1, 1.0, 1500)
+        balance = power_balance(asym, *at(SIMULATION_1)(t), along=t)
+        return *(one.peak_error for one in found.replays.values()), balance.residual, balance.storage
+
+    one = gathered()
+    asym.threads = 2
+    try:
+        two = gathered()
+    finally:
+        asym.threads = 1
+    assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
 
 
 @pytest.mark.parametrize(

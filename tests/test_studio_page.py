@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 pytest.importorskip("viser", reason="the extra studio is not installed")
+
+from viser import GuiEvent
 
 from workbench.studio.curves import COORDINATE, ERROR, POWER, TORQUE, curves_of
 from workbench.studio.page import Page
@@ -39,14 +43,25 @@ def page(paper: Subject) -> Iterator[Page]:
 
 
 def idle(page: Page) -> None:
-    assert page.worker.idle(PATIENCE)
+    assert page.idle(PATIENCE)
+
+
+def by_hand(page: Page, handle: Any, value: Any) -> None:
+    """What viser does when a browser says that an input was moved."""
+
+    async def arrives() -> None:
+        handle._impl.value = value
+        for told in handle._impl.update_cb:
+            await told(GuiEvent(None, 1, handle))
+
+    asyncio.run_coroutine_threadsafe(arrives(), page.server.get_event_loop()).result(PATIENCE)
 
 
 def test_a_moved_slider_arrives_and_its_answer_is_written(page: Page) -> None:
     idle(page)
     assert "nothing was changed here" in page._head.content
     slider = page.knobs._sliders["m3"]
-    slider.value = 0.6  # as a hand does: by the callbacks of the slider
+    by_hand(page, slider, 0.6)
     idle(page)
     assert page.session.values()["m3"] == 0.6
     assert "m3 from 0.45 to 0.6 kg" in page._head.content
@@ -62,6 +77,39 @@ def test_a_moved_slider_arrives_and_its_answer_is_written(page: Page) -> None:
     page.step("Back to the paper")
     idle(page)
     assert slider.value == 0.45
+
+
+def test_what_a_hand_gives_outlives_what_the_page_puts_there_meanwhile(page: Page) -> None:
+    idle(page)
+    slider, gate = page.knobs._sliders["m3"], threading.Event()
+    page.hands.do(lambda: gate.wait(PATIENCE))  # the page is slow
+    for value in (0.5, 0.55, 0.6):
+        by_hand(page, slider, value)
+    page._moved = None
+    page._follow()  # what was computed before is shown, and the sliders go with it
+    assert slider.value == 0.6
+    gate.set()
+    idle(page)
+    page._follow()
+    assert page.session.values()["m3"] == slider.value == 0.6
+    page.step("Undo")  # one gesture, one step
+    idle(page)
+    assert slider.value == 0.45
+
+
+def test_the_ends_of_a_slider_stay_under_the_hand(page: Page) -> None:
+    idle(page)
+    own, other = page.knobs._sliders["a1"], page.knobs._sliders["a2"]
+    reach, narrow = (own.min, own.max), (other.min, other.max)
+    low = page.session.knob("a1").low, page.session.knob("a2").low
+    assert own.min > low[0]
+    assert other.min > low[1]
+    by_hand(page, own, 0.21)
+    assert page.hands.idle(PATIENCE)
+    assert (own.min, own.max) == reach
+    assert (other.min, other.max) != narrow
+    idle(page)
+    assert (own.min, own.max) == reach
 
 
 def test_what_is_typed_may_lie_beyond_the_sliders_and_what_is_wrong_is_said(page: Page) -> None:
@@ -82,17 +130,17 @@ def test_what_is_typed_may_lie_beyond_the_sliders_and_what_is_wrong_is_said(page
 
 
 def test_case_motion_and_formulas_are_chosen(page: Page) -> None:
-    page._case.value = "simulation_2"
+    by_hand(page, page._case, "simulation_2")
     idle(page)
     assert page.session.good.state.case == "simulation_2"
-    page._fast.value = 0.5
+    by_hand(page, page._fast, 0.5)
     idle(page)
     assert "motion 0.5 times as fast" in page._head.content
     for box in page._held:
-        box.value = False
+        by_hand(page, box, False)
     idle(page)
     assert "No formula is held" in page._verdict.content
-    page._quantity.value = ERROR
+    by_hand(page, page._quantity, ERROR)
     idle(page)
     assert "No formula is held" in page._key.content
 
@@ -108,7 +156,8 @@ def test_time_runs_and_stops_at_the_worst_moment(page: Page) -> None:
     page.worst()
     assert not page._playing
     assert page.sample == page.session.good.worst_moment() == page._time.value
-    page._time.value = 7
+    by_hand(page, page._time, 7)
+    idle(page)
     assert page.sample == 7
 
 
@@ -116,10 +165,10 @@ def test_marks_slice_and_target(page: Page) -> None:
     for mark in MARKS:
         page.scene.switch(mark, True)
     page.at(3)
-    page.pointing._plane.value = "y z"
+    by_hand(page, page.pointing._plane, "y z")
     idle(page)
     assert "cells of" in page.pointing._said.content
-    page.pointing._drag.value = True
+    by_hand(page, page.pointing._drag, True)
     idle(page)
     start = np.asarray(page.pointing._grip.position)
     origin, rotation = page.pointing._frame()

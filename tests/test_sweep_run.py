@@ -299,7 +299,7 @@ def test_other_versions_are_refused(
 ) -> None:
     before = listing(calm)
     other = {**identity.versions(), what: "9.9.9"}
-    monkeypatch.setattr("workbench.sweep.state.versions", lambda: other)
+    monkeypatch.setattr("workbench.sweep.resumable.versions", lambda: other)
     done = workbench("run", "small.toml", "--out", "calm")
     assert done.code == 2
     assert len(done.complaint) == 1

@@ -48,20 +48,32 @@ def relative_error(candidate: FloatArray, reference: FloatArray) -> JointError:
         A reference that is zero throughout gives 0 where the candidate is zero too, and inf otherwise. NaN anywhere
         gives NaN errors, which satisfy no bound.
     """
-    difference = np.abs(candidate - reference)
-    magnitude = np.abs(reference)
-    peak = float(magnitude.max())
-    worst = int(np.argmax(np.where(np.isnan(difference), np.inf, difference)))
-    kept = magnitude >= POINTWISE_FLOOR * peak
-    pointwise = float(np.max(difference[kept] / magnitude[kept])) if peak > 0 else _ratio(difference.max(), 0.0)
-    return JointError(
-        peak_error=_ratio(float(difference.max()), peak),
-        rms_error=_ratio(float(np.sqrt(np.mean(difference**2))), float(np.sqrt(np.mean(reference**2)))),
-        pointwise_error=pointwise,
-        pointwise_skipped=int(np.count_nonzero(~kept)),
-        peak_reference=peak,
-        worst_index=worst,
-    )
+    return relative_errors(candidate[:, None], reference[:, None])[0]
+
+
+def relative_errors(candidate: FloatArray, reference: FloatArray) -> list[JointError]:
+    """`relative_error` of each column of ``(n, k)``, one joint each, with the same bits."""
+    # a row a joint, in one piece: then NumPy adds up each as it does a series by itself
+    difference = np.ascontiguousarray(np.abs(candidate - reference).T)
+    magnitude = np.ascontiguousarray(np.abs(reference).T)
+    peaks, largest = magnitude.max(axis=1), difference.max(axis=1)
+    kept = magnitude >= POINTWISE_FLOOR * peaks[:, None]
+    judged = kept & (peaks > 0.0)[:, None]
+    quotients = np.divide(difference, magnitude, out=np.zeros_like(difference), where=judged).max(axis=1)
+    worst = np.argmax(np.where(np.isnan(difference), np.inf, difference), axis=1)
+    rms, rms_reference = (np.sqrt(np.mean(values**2, axis=1)).tolist() for values in (difference, magnitude))
+    skipped = (kept.shape[1] - np.count_nonzero(kept, axis=1)).tolist()
+    return [
+        JointError(
+            peak_error=_ratio(off, peak),
+            rms_error=_ratio(rms[joint], rms_reference[joint]),
+            pointwise_error=float(quotients[joint]) if peak > 0 else _ratio(off, 0.0),
+            pointwise_skipped=skipped[joint],
+            peak_reference=peak,
+            worst_index=int(worst[joint]),
+        )
+        for joint, (off, peak) in enumerate(zip(largest.tolist(), peaks.tolist(), strict=True))
+    ]
 
 
 def _ratio(numerator: float, denominator: float) -> float:

@@ -22,6 +22,11 @@ BEGIN = (
 BEGIN_CODE = "import sys; sys.path[:] = __import__('json').loads(sys.argv[1]); exec(sys.argv[2])"
 
 
+def cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def module_path() -> list[str]:
     """Where this process looks for modules, without what stands for the current directory, wherever that is."""
     return [entry for entry in sys.path if isinstance(entry, str) and os.path.isabs(entry)]

@@ -10,12 +10,12 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import binomtest
 
-from mutants import modules, tree, trial
+from mutants import modules, short, tree, trial
 from mutants.named import EQUIVALENT, NAMED
 from mutants.operators import Mutant, compiles, mutants_of
 from mutants.reached import Reached
@@ -27,12 +27,12 @@ INTERPRETED = PLACE / "reached-interpreted.json"
 RESULTS = PLACE / "results.jsonl"
 BASELINE_LIMIT = 3600
 """seconds of the processor for the core tests without a fault"""
-GIVEN_LIMIT = 600
-"""seconds of the processor for test files that are tried whole"""
 COMPILING = 120
 """seconds of the processor that compiling kernels may add"""
 A_MOMENT = 0.05
 """seconds that any test takes"""
+A_WHILE = 30
+"""seconds of the processor on top of twice what tests take without a fault"""
 
 
 @dataclass(frozen=True)
@@ -69,9 +69,9 @@ def main() -> int:
     known = {entry["key"]: entry for entry in _results()}
     for number, planted in enumerate(chosen, 1):
         before = known.get(planted.key)
-        if before and (before["status"] == trial.KILLED or not options.again):
+        if before and not (options.again and before["status"] == trial.SURVIVED) and before["status"] != trial.BROKEN:
             continue
-        files = options.tests or (modules.short_tests(planted.group, planted.module) if options.short else [])
+        files = options.tests or (modules.short_tests(planted.module) if options.short else [])
         outcome, tests = _try(planted, options.budget, files)
         entry = {"key": planted.key, "group": planted.group, "module": planted.module, **asdict(planted.mutant),
                  **asdict(outcome), "tests": tests}  # fmt: skip
@@ -183,19 +183,22 @@ def _reach(files: list[str], place: Path) -> None:
 def _try(planted: Planted, budget: float, files: list[str]) -> tuple[trial.Outcome, int]:
     """Try one fault: with the tests that reach it, or, where test *files* are given, with those."""
     kernel = modules.is_kernel(planted.module)
-    interpreted = kernel and planted.module.startswith("reference/")
-    if files and (failing := _without_fault(tuple(files), interpreted)):
-        return trial.Outcome(trial.BROKEN, f"fails without a fault: {failing}", 0.0), 0
+    of_reference = planted.module.startswith("reference/")
     text = tree.source_of(planted.module)
+    given: list[str] = []
+    if files:
+        given, takes, failing = short.tests_of(tuple(files), kernel and of_reference)
+        limit = int(2 * takes) + A_WHILE
+        if not given:
+            return trial.Outcome(trial.BROKEN, f"fail without a fault: {' '.join(failing)}", 0.0), 0
     with tree.planted(planted.module, planted.mutant.planted(text)):
-        if files and kernel and not planted.module.startswith("reference/"):
+        if files and kernel and not of_reference:
             with tree.own_cache() as own:
-                outcome, tried = trial.trial(files, own, GIVEN_LIMIT), len(files)
-        elif files:
-            outcome, tried = trial.trial(files, tree.CACHE, GIVEN_LIMIT, interpreted=interpreted), len(files)
-        else:
-            outcome, tried = _try_reaching(planted, INTERPRETED if kernel else REACHED, budget)
-        if not kernel or files or outcome.status != trial.SURVIVED:
+                return trial.trial(given, own, limit + COMPILING), len(given)
+        if files:
+            return trial.trial(given, tree.CACHE, limit, interpreted=kernel), len(given)
+        outcome, tried = _try_reaching(planted, INTERPRETED if kernel else REACHED, budget)
+        if not kernel or outcome.status != trial.SURVIVED:
             return outcome, tried
         compiled = modules.kernel_tests(planted.module)
         durations = json.loads(REACHED.read_text(encoding="utf-8"))["durations"]
@@ -203,13 +206,6 @@ def _try(planted: Planted, budget: float, files: list[str]) -> tuple[trial.Outco
         with tree.own_cache() as own:
             second = trial.trial(compiled, own, limit)
         return trial.Outcome(second.status, second.by, outcome.seconds + second.seconds), tried + len(compiled)
-
-
-@cache
-def _without_fault(files: tuple[str, ...], interpreted: bool) -> str:
-    """The first of these tests that fails on the package as it is, uncompiled or not; empty where all pass."""
-    outcome = trial.trial(files, tree.CACHE, GIVEN_LIMIT, interpreted=interpreted)
-    return "" if outcome.status == trial.SURVIVED else outcome.by or outcome.status
 
 
 def _try_reaching(planted: Planted, place: Path, budget: float) -> tuple[trial.Outcome, int]:
@@ -257,17 +253,26 @@ def _results() -> list[dict[str, object]]:
 
 
 def _summary(chosen: list[Planted], known: dict[str, dict[str, object]]) -> int:
-    survivors = 0
+    alive = untried = 0
     for group in dict.fromkeys(planted.group for planted in chosen):
         states = [known[planted.key]["status"] for planted in chosen if planted.group == group]
-        alive = states.count(trial.SURVIVED)
-        survivors += alive
-        untried = states.count(trial.BROKEN)
-        print(f"{group}: {len(states) - alive - untried} of {len(states) - untried} noticed, {untried} not tried")
-    for planted in chosen:
-        if known[planted.key]["status"] == trial.SURVIVED:
-            print(f"survived: {planted.group}  {planted.module}:{planted.mutant.line}  {planted.mutant.said()}")
-    return 1 if survivors else 0
+        survived, broken = states.count(trial.SURVIVED), states.count(trial.BROKEN)
+        alive, untried = alive + survived, untried + broken
+        tried = len(states) - broken
+        print(f"{group}: {tried - survived} of {tried} noticed{_share(tried - survived, tried)}, {broken} not tried")
+    for status, word in ((trial.SURVIVED, "survived"), (trial.BROKEN, "not tried")):
+        for planted in chosen:
+            if known[planted.key]["status"] == status:
+                print(f"{word}: {planted.group}  {planted.module}:{planted.mutant.line}  {planted.mutant.said()}")
+    return 1 if alive else 2 if untried else 0
+
+
+def _share(noticed: int, tried: int) -> str:
+    """The share with the interval in which that of all faults lies at 95 % (Wilson)."""
+    if tried < 2:
+        return ""
+    interval = binomtest(noticed, tried).proportion_ci(0.95, method="wilson")
+    return f" ({noticed / tried:.0%}; of all faults {interval.low:.0%} to {interval.high:.0%})"
 
 
 if __name__ == "__main__":

@@ -20,8 +20,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
 CORE_TESTS = (
     "agreement", "asym_kernel", "asym_literal", "asym_mobility", "body_numbers", "campaign_run", "campaign_spec",
     "case_figures", "closure_kinds", "compare_case", "counted_forces", "errata", "friction", "fuzz_mechanisms",
-    "hints", "idle_rods",
-    "importing", "malformed_mechanisms", "mass_models", "metrics", "mjcf_assumptions", "mjcf_edit", "mjcf_roundtrip",
+    "engine_warnings", "hints", "idle_rods", "importing", "malformed_mechanisms", "mass_models", "metrics",
+    "mjcf_assumptions", "mjcf_edit", "mjcf_roundtrip",
     "mjcf_safety", "mjcf_setup", "mjcf_source", "model_command", "models", "motion_along", "motion_platform",
     "negative_controls", "own_campaign", "own_reference", "pinocchio_reference", "planar_4rprp", "planar_4rprp_model",
     "platform_side", "random_robots", "reactions", "recorded", "reference_closure", "reference_dynamics",
@@ -43,58 +43,83 @@ KERNEL_TESTS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Beginnings of the names of files with kernels, the first that fits: tests of the compiled kernels."""
 
-UNCOMPILED = ("closure_kinds", "own_reference")
-"""Of these the quickest."""
-
 INTERPRETED_TESTS = ("reference_linear", "closure_kinds", "own_reference", "reactions", "idle_rods", "task_coordinates")
 """Small enough to run with all kernels uncompiled."""
 
-
-GROUP_TESTS: dict[str, tuple[str, ...]] = {
-    "metrics": ("metrics",),
-    "verdict": ("verdict", "compare_case"),
-    "comparison": ("verdict", "compare_case"),
-    "mjcf": ("mjcf_setup", "mjcf_roundtrip", "mjcf_source", "mjcf_assumptions"),
-    "robots": (
-        "agreement",
-        "body_numbers",
-        "screws",
-        "asym_literal",
-        "planar_4rprp",
-        "mass_models",
-        "mjcf_roundtrip",
-        "robot_file",
-        "mjcf_assumptions",
-        "mjcf_edit",
-        "friction",
-        "errata",
-    ),
-    "reference": ("reference_linear", "closure_kinds", "own_reference", "counted_forces", "reference_closure"),
-}
-"""The tests of each group that a short run tries, in this order, without knowing who reaches what."""
-
+LOOPS = ("closure_kinds", "own_reference", "idle_rods", "reactions")
+"""Tests of all that closes loops; they take seconds, also uncompiled."""
 
 SHORT_TESTS: dict[str, tuple[str, ...]] = {
+    "metrics": ("metrics",),
+    "campaign/": ("verdict", "compare_case"),
+    "mjcf/engine_warnings": ("engine_warnings",),
+    "mjcf/free_joints": ("mjcf_setup", "importing"),
+    "mjcf/loop_table": ("urdf",),
+    "mjcf/safety": ("mjcf_safety", "mjcf_source"),
+    "mjcf/urdf": ("urdf",),
+    "mjcf/": ("mjcf_setup", "mjcf_source", "mjcf_edit", "mjcf_safety", "mjcf_roundtrip"),
+    "robots/asym_2rss_ppap/literal": ("asym_literal",),
+    "robots/asym_2rss_ppap/mobility": ("asym_mobility", "mjcf_assumptions"),
+    "robots/asym_2rss_ppap/": ("asym_kernel", "asym_literal", "friction"),
+    "robots/planar_4rprp/": ("planar_4rprp", "planar_4rprp_model", "friction"),
+    "robots/screws": ("screws", "planar_4rprp", "asym_mobility"),
+    "robots/sine_cosine": ("speed_semantics", "asym_kernel"),
+    "robots/blocks": ("speed_semantics", "asym_kernel", "planar_4rprp"),
+    "robots/kernel_call": ("speed_semantics", "asym_kernel", "planar_4rprp"),
+    "robots/limbs": ("turning",),
+    "robots/turning": ("turning",),
+    "robots/variants": ("variants",),
+    "robots/mass_models": ("mass_models", "asym_kernel"),
+    "robots/show": ("model_command", "mjcf_edit"),
+    "robots/edit": ("mjcf_edit", "model_command"),
+    "robots/robot_file": ("robot_file", "actuators"),
+    "robots/actuators": ("robot_file", "actuators"),
+    "robots/assumptions/": ("mjcf_assumptions", "robot_file"),
+    "robots/": ("robot_file", "agreement", "body_numbers", "mjcf_roundtrip", "mjcf_assumptions", "mjcf_edit"),
+    "dry_friction": ("friction",),
+    "reference/along": ("motion_along", "sides"),
+    "reference/body_": ("terms", "counted_forces"),
     "reference/check": ("mjcf_assumptions", "own_reference"),
-    "reference/closing": ("closure_kinds", "compiled_closure"),
     "reference/continuation": ("closure_kinds", "reference_closure", "motion_along"),
-    "reference/left_out": ("refusals", "importing"),
-    "reference/pinocchio": ("pinocchio_reference",),
-    "reference/platform_": ("task_coordinates",),
+    "reference/crossings": ("importing",),
+    "reference/forward": ("control_plant",),
+    "reference/left_o": ("refusals", "importing", "tolerances", "idle_rods"),
+    "reference/linear": ("reference_linear", "closure_kinds"),
+    "reference/pinocchio": ("pinocchio_reference", "sides", "second_engine_campaigns"),
+    "reference/platform_": ("task_coordinates", "platform_side"),
+    "reference/power": ("reference_evidence", "counted_forces"),
+    "reference/regressor": ("terms",),
     "reference/replay": ("counted_forces", "reference_evidence"),
+    "reference/rods": ("idle_rods", "reference_closure"),
+    "reference/shelf": ("variants",),
     "reference/sides": ("sides",),
+    "reference/skeleton": ("report_skeleton",),
+    "reference/stiff_plant": ("control_plant",),
     "reference/survey": ("importing",),
-    "reference/task_rows": ("task_coordinates",),
+    "reference/task": ("task_coordinates",),
+    "reference/terms": ("terms",),
+    "reference/tolerance": ("tolerances", "own_reference"),
+    "reference/uncovered": ("refusals", "counted_forces"),
+    "reference/varied_model": ("terms",),
+    "reference/": (*LOOPS, "refusals", "counted_forces"),
 }  # fmt: skip
-"""The same for files that other tests know better, by the beginnings of their names."""
+"""Beginnings of names of files, the first that fits: the test files of a short run, which looks at no map of lines."""
+
+UNCOMPILED_TESTS: dict[str, tuple[str, ...]] = {
+    "reference/forward": ("control_plant",),
+    "reference/linear": ("reference_linear", "closure_kinds"),
+    "reference/platform_": ("task_coordinates",),
+    "reference/sides": ("sides",),
+    "reference/task_rows": ("task_coordinates",),
+    "reference/": LOOPS,
+}  # fmt: skip
+"""The same for the reference's kernels, which are left uncompiled."""
 
 
-def short_tests(group: str, module: str) -> list[str]:
+def short_tests(module: str) -> list[str]:
     """Test files of a short run."""
-    names = next((tests for start, tests in SHORT_TESTS.items() if module.startswith(start)), GROUP_TESTS[group])
-    if is_kernel(module) and names is GROUP_TESTS[group]:
-        names = UNCOMPILED if module.startswith("reference/") else KERNEL_TESTS[f"{module.rpartition('/')[0]}/"]
-    return [test_file(name) for name in names]
+    table = UNCOMPILED_TESTS if is_kernel(module) and module.startswith("reference/") else SHORT_TESTS
+    return [test_file(name) for name in next(tests for start, tests in table.items() if module.startswith(start))]
 
 
 def files_of(group: str) -> list[str]:

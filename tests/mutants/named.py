@@ -59,8 +59,8 @@ NAMED: dict[str, Named] = {
     "LONGEST_STEP x 100, second engine": Named(PINOCCHIO, "LONGEST_STEP = 0.2", "LONGEST_STEP = 20.0"),
     # checks of a model
     "structure not checked": Named(LOAD, "    _check(described, model, file, text, None)\n", ""),
-    "numbers not checked": Named(LOAD, "    _check(described, model, file, text, values, elements)\n    computed", "    computed"),
-    "edited numbers not checked": Named(LOAD, "    _check(described, model, file, text, values, elements)\n    return", "    return"),
+    "numbers not checked": Named(LOAD, "        _check(described, model, file, text, values, elements)\n    loaded", "        pass\n    loaded"),
+    "edited numbers not checked": Named(LOAD, "        _check(described, model, file, text, values, elements)\n    return", "    return"),
     "places that disagree not refused": Named(LOAD, "    elif values is not None and elements is not None:", "    elif False:"),
     "rank of a pose not tested": Named(REFERENCE, "bad = (rank < len(structure.passive)) | ~(", "bad = ~("),
     "speed of a pose not tested": Named(REFERENCE, "bad = (rank < len(structure.passive)) | ~(residual <= self._closer.tolerance.velocity * speed)", "bad = rank < len(structure.passive)"),
@@ -71,8 +71,8 @@ NAMED: dict[str, Named] = {
     "mobility not checked": Named(CHECK, "if mobility > active or (", "if ("),
     "platform's place not checked": Named(CHECK, "ok = gap <= SAME_PLACE", "ok = True"),
     # errors and verdicts
-    "peak error above the floor only": Named(METRICS, "peak_error=_ratio(float(difference.max()), peak)", "peak_error=_ratio(float(difference[kept].max()), peak)"),
-    "rms error above the floor only": Named(METRICS, "np.mean(difference**2)", "np.mean(difference[kept]**2)"),
+    "peak error above the floor only": Named(METRICS, "zip(largest.tolist(), peaks", "zip(np.where(kept, difference, 0.0).max(axis=1).tolist(), peaks"),
+    "rms error above the floor only": Named(METRICS, "for values in (difference, magnitude)", "for values in (np.where(kept, difference, 0.0), magnitude)"),
     "the least uncertainty": Named(EVIDENCE, "return max((value for value in found", "return min((value for value in found"),
     "second engine not counted": Named(EVIDENCE, "found = (self.power_residual(mass_model), self.engine_spread(mass_model, joint), left_open)", "found = (self.power_residual(mass_model), left_open)"),
     "power balance not counted": Named(EVIDENCE, "found = (self.power_residual(mass_model), self", "found = (self"),

@@ -10,15 +10,38 @@ from typing import Any
 import pytest
 
 
-class Reached:
-    """A pytest plugin: coverage with the running test as context, written as JSON at the end."""
+class Timed:
+    """A pytest plugin: what each test takes of the processor and which fail, written as JSON at the end."""
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.durations: dict[str, float] = {}
+        self.failed: list[str] = []
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: Any) -> Any:
+        start = time.process_time()
+        try:
+            return (yield)
+        finally:
+            self.durations[item.nodeid] = time.process_time() - start
+
+    def pytest_runtest_logreport(self, report: Any) -> None:
+        if report.failed:
+            self.failed.append(report.nodeid)
+
+    def pytest_sessionfinish(self) -> None:
+        self.out.write_text(json.dumps({"durations": self.durations, "failed": self.failed}), encoding="utf-8")
+
+
+class Reached(Timed):
+    """The same, and coverage with the running test as context."""
 
     def __init__(self, package: Path, out: Path) -> None:
         from coverage import Coverage
 
-        self.package, self.out = package, out
-        self.durations: dict[str, float] = {}
-        self.failed: list[str] = []
+        super().__init__(out)
+        self.package = package
         self.coverage = Coverage(data_file=None, config_file=False, source=[str(package)], messages=False)
 
     def pytest_sessionstart(self) -> None:
@@ -27,16 +50,10 @@ class Reached:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: Any) -> Any:
         self.coverage.switch_context(item.nodeid)
-        start = time.process_time()
         try:
-            return (yield)
+            return (yield from super().pytest_runtest_protocol(item))
         finally:
-            self.durations[item.nodeid] = time.process_time() - start
             self.coverage.switch_context("")
-
-    def pytest_runtest_logreport(self, report: Any) -> None:
-        if report.failed:
-            self.failed.append(report.nodeid)
 
     def pytest_sessionfinish(self) -> None:
         self.coverage.stop()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.campaign.motion_spec import MAX_SAMPLES, RecordedMotion
+from workbench.campaign.motion_spec import MAX_SAMPLES, RecordedMotion, TableMotion
 from workbench.campaign.not_driven import NotDriven, with_nearest_joints
 from workbench.campaign.planned import formula_of, planned_motion
 from workbench.campaign.recorded import read_torques, recorded_motion, records_of
@@ -52,6 +53,11 @@ class Case:
     def name(self) -> str:
         """The case's name, which is also its file's."""
         return self.spec.name
+
+    @cached_property
+    def singularity(self) -> dict[str, FloatArray]:
+        """`Robot.singularity_measures` along the motion."""
+        return self.robot.singularity_measures(self.motion.q)
 
 
 def resolve_cases(
@@ -189,6 +195,18 @@ def robot_files(campaign: Campaign, file: Path, model: Path | None = None) -> li
     robot, path = robot_of(campaign, file, model)
     beside = path.parent / FILE
     return [path, *([robot.path] if robot and campaign.robot else [beside] if beside.is_file() else [])]
+
+
+def tables_of(campaign: Campaign, file: Path) -> list[Path]:
+    """Files of the motions that are given by one, in the order of the cases.
+
+    Raises
+    ------
+    SpecError
+        As `locate`.
+    """
+    names = [case.motion.file for case in campaign.case if isinstance(case.motion, TableMotion)]
+    return [locate(file, name, "motion.file") for name in dict.fromkeys(names)]
 
 
 def locate(campaign_file: Path, name: str, what: str) -> Path:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,11 @@ from workbench.campaign.kinematics import check_kinematics
 from workbench.campaign.platform import Platform, platform_of
 from workbench.campaign.recorded import Found, judge
 from workbench.campaign.recorded_spec import RecordedSpec
+from workbench.campaign.series import series_of
 from workbench.campaign.spec import Campaign
 from workbench.campaign.spent import spent_on
 from workbench.campaign.torques import Fault, torques_of
-from workbench.campaign.unloaded import joint_error, largest_reaction, normaliser_of
+from workbench.campaign.unloaded import joint_errors, largest_reaction, normaliser_of
 from workbench.campaign.verdict import CONTRAST, FAIL, FAILURES, RECORDED, kind_of, verdict_of
 from workbench.errors import ModelError, MotionError
 from workbench.hints import hint_of
@@ -77,11 +79,12 @@ class Row:
 
 @dataclass(frozen=True)
 class CaseResult:
-    """What a computed case leaves behind: rows, time series, and facts for the manifest."""
+    """What a computed case leaves behind: rows, facts for the manifest, and time series where somebody asks."""
 
     name: str
     rows: list[Row]
-    series: dict[str, FloatArray] = field(repr=False)
+    columns: Callable[[], dict[str, FloatArray]] = field(repr=False)
+    """how `series` is made; most cases of a sweep keep none"""
     facts: dict[str, Any] = field(repr=False)
     faults: Sequence[Fault] = ()
     """what the user's candidates did wrong"""
@@ -89,6 +92,11 @@ class CaseResult:
     """MuJoCo's model of the reference, the case's parameters in it; with drawings only"""
     qpos: FloatArray | None = field(default=None, repr=False)
     """``(n, nq)`` its poses, MuJoCo's own coordinates; with drawings only"""
+
+    @cached_property
+    def series(self) -> dict[str, FloatArray]:
+        """Time series by name of their column, ``(n,)`` each; docs/run-directory.md lists them."""
+        return self.columns()
 
 
 def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseResult:
@@ -103,8 +111,8 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     """
     motion, robot = case.motion, case.robot
     reference = case.robot.reference
+    reference.threads = effort.threads
     results: dict[str, ReferenceResult] = {}
-    series = _motion_columns(case)
     try:
         for mass_model in _references(campaign, case):
             results[mass_model] = reference.inverse_dynamics(
@@ -118,7 +126,6 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         raise at_time(error, motion.t) from error
     left = _left_out(case, reference, first)
     platform = platform_of(case, first)
-    series |= platform.columns()
     if robot.closed_kinematics:  # else the case's platform motion is the reference's own
         _refuse_other_branch(case, platform.task[0])
     sound = [name for name in torques if name not in computed.faults]
@@ -135,35 +142,30 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     rows += [row for found in recorded for row in _recorded_rows(case, found, evidence)]
     if effort.budget:
         rows += _raw_rows(case, reference, results, evidence, felt)
-    for mass_model, result in results.items():
-        series |= _columns(f"ref_{mass_model}", result.tau, robot.joints)
-    for name in sound:
-        tau = torques[name]
-        series |= _columns(f"cand_{name}", tau, robot.joints)
-    for found in recorded:
-        series |= _columns(f"rec_{found.spec.label}", found.tau, robot.joints)
-        series |= _columns(f"band_{found.spec.label}", found.band, robot.joints)
-    for joint, force in first.reactions.items():
-        series |= {f"reaction_{joint}_{axis}": force[:, i] for i, axis in enumerate("xyz")}
-    series["closure_residual"] = first.closure_residual
     facts = _facts(case, first, rows, platform) | {"evidence": evidence.facts()}
     if effort.described:
         facts |= _description(case, reference, first) | {"demand": demand_facts(case, results)}
     if recorded:
         facts["recorded"] = {found.spec.label: found.facts for found in recorded}
     facts["warnings"] = [*facts["warnings"], *hints, *left]
+    drawn_columns: dict[str, FloatArray] = {}
     if effort.drawing:
         drawing = skeleton(reference, first.qpos)
         for point, place in drawing.points.items():
-            series |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
+            drawn_columns |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
         columns, spent = spent_on(case, reference, next(iter(results)))
-        series |= columns
+        drawn_columns |= columns
         if spent:
             facts["spent"] = spent
     poses, drawn = (first.qpos, reference.compiled()) if effort.drawing else (None, None)
     faults = tuple(computed.faults.values())
     facts = check_kinematics(case, reference, platform).noted(computed.noted(facts))
+
+    def series() -> dict[str, FloatArray]:
+        found = series_of(case, platform, results, {name: torques[name] for name in sound}, recorded)
+        return found | drawn_columns
+
     return CaseResult(case.name, rows, series, facts, faults, drawn, poses)
 
 
@@ -239,8 +241,8 @@ def _rows(
     reaction = felt[candidate.reference]
     known = case.robot.candidates.get(candidate.name)
     mass_model = known.mass_model if known else candidate.reference
-    for i, joint in enumerate(case.robot.joints):
-        error = joint_error(tau[:, i], reference.tau[:, i], reaction)
+    errors = joint_errors(tau, reference.tau, reaction)
+    for i, (joint, error) in enumerate(zip(case.robot.joints, errors, strict=True)):
         uncertainty = evidence.uncertainty(candidate.reference, joint)
         judged = candidate.in_case(case.spec, joint)
         rows.append(
@@ -312,24 +314,12 @@ def _recorded_rows(case: Case, found: Found, evidence: Evidence) -> list[Row]:
     ]
 
 
-def _columns(prefix: str, values: FloatArray, joints: tuple[str, ...]) -> dict[str, FloatArray]:
-    return {f"{prefix}_{joint}": values[:, i] for i, joint in enumerate(joints)}
-
-
-def _motion_columns(case: Case) -> dict[str, FloatArray]:
-    motion = case.motion
-    columns: dict[str, FloatArray] = {"t": motion.t}
-    for prefix, values in (("q", motion.q), ("qd", motion.qd), ("qdd", motion.qdd)):
-        columns |= {f"{prefix}{i + 1}": values[:, i] for i in range(values.shape[1])}
-    return columns
-
-
 def _facts(case: Case, result: ReferenceResult, rows: list[Row], platform: Platform) -> dict[str, Any]:
     """What is judged of a case, and figures that a sweep stores."""
     t = case.motion.t
     speed = np.linalg.norm(result.xd, axis=1)
     acceleration = np.linalg.norm(result.xdd, axis=1)
-    measures = case.robot.singularity_measures(case.motion.q)
+    measures = case.singularity
     kinematics = {}
     if case.robot.closed_kinematics:  # else case.x is the reference's own
         kinematics = {

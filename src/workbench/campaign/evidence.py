@@ -39,6 +39,8 @@ class Effort:
     """the robot's points over time, for drawings of it"""
     timed: bool = True
     """a slow formula is warned of; not where warnings are stored as numbers, which must not depend on the clock"""
+    threads: int = 1
+    """that the reference's samples are evaluated over; more than one where no other case is computed meanwhile"""
     described: bool = True
     """all that a manifest says of a case; without it, what is judged and the figures that a sweep stores"""
 

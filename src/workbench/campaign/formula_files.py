@@ -36,6 +36,12 @@ class _Uncached(SourceFileLoader):
         return self.source_to_code(read_bytes(self.path, LARGEST_SOURCE), self.path)
 
 
+def files_of(file: Path, siblings: Siblings | None) -> tuple[Path, ...]:
+    """A file of code and those beside it that it has imported."""
+    others = siblings.files if siblings else set()
+    return (file, *sorted(path for path in others if path != file))
+
+
 class Siblings:
     """Finds modules beside a file, for the code of that directory alone; keeps them out of ``sys.modules``."""
 

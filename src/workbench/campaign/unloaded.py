@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.metrics import JointError, relative_error
+from workbench.metrics import JointError, relative_errors
 
 UNLOADED = 3e-5
 """A joint whose force (N) or torque (N m) stays below this fraction of the largest joint reaction (N; times 1 m) over
@@ -37,7 +37,16 @@ def joint_error(candidate: FloatArray, reference: FloatArray, reaction: float) -
     `peak_reference` stays the largest |reference|. All samples of an unloaded joint count in `pointwise_error`, which
     equals `peak_error`.
     """
-    error = relative_error(candidate, reference)
+    return joint_errors(candidate[:, None], reference[:, None], reaction)[0]
+
+
+def joint_errors(candidate: FloatArray, reference: FloatArray, reaction: float) -> list[JointError]:
+    """`joint_error` of each column of ``(n, na)``."""
+    errors = relative_errors(candidate, reference)
+    return [_judged(error, candidate[:, i], reference[:, i], reaction) for i, error in enumerate(errors)]
+
+
+def _judged(error: JointError, candidate: FloatArray, reference: FloatArray, reaction: float) -> JointError:
     limit = UNLOADED * reaction
     if not error.peak_reference < limit:
         return error

@@ -24,7 +24,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.campaign.bounded_call import TooSlow, UnrulyError, bounded, said
 from workbench.campaign.candidate_spec import LARGEST_BOUND, CandidateSpec
-from workbench.campaign.formula_files import Siblings, load_module
+from workbench.campaign.formula_files import Siblings, files_of, load_module
 from workbench.campaign.formula_signature import wants_of
 from workbench.campaign.spec import Campaign
 from workbench.capabilities.robot import Robot
@@ -62,8 +62,7 @@ class UserCandidate:
     @property
     def files(self) -> tuple[Path, ...]:
         """The file and those beside it that it has imported."""
-        others = self._siblings.files if self._siblings else ()
-        return (self.file, *sorted(path for path in others if path != self.file))
+        return files_of(self.file, self._siblings)
 
     @property
     def where(self) -> str:

@@ -32,8 +32,8 @@ def run_before(path: Path, after: Manifest) -> Iterator[Run]:
         return
     from workbench.campaign.evidence import Effort
     from workbench.campaign.run import run_campaign
-    from workbench.console import CaseProgress
     from workbench.scratch import scratch_directory
+    from workbench.terminal import CaseProgress
 
     spec, _ = load_campaign(path)
     known = [case.name for case in spec.case if case.name in after.cases]

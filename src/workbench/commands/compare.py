@@ -53,10 +53,10 @@ def compare(
     from workbench.commands.change_table import LEGEND, change_table
     from workbench.compare.outcome import NOTHING, WORSE, outcome_of
     from workbench.compare.runs import compare_loaded
-    from workbench.console import out
     from workbench.output_file import refuse_target
     from workbench.report.load import load_run
     from workbench.sweep.files import write_bytes
+    from workbench.terminal import out
 
     refuse_no_fraction(good)
     if html is not None:
@@ -123,7 +123,7 @@ def _print_asked(found: RunComparison) -> None:
     from workbench.commands.change_table import NARROW
     from workbench.compare.asked import WORDS, worst_over_cases
     from workbench.compare.sections import ratio_text
-    from workbench.console import out
+    from workbench.terminal import out
 
     rows = [one for one in worst_over_cases([*found.demands, *_worst_reaction(found)]) if not one.same]
     if not rows:
@@ -159,7 +159,7 @@ def _print_differences(title: str, found: Sequence[Difference]) -> None:
     from rich.text import Text
 
     from workbench.commands.change_table import NARROW
-    from workbench.console import out
+    from workbench.terminal import out
 
     if not found:
         out.print(Text(f"{title}: no difference."))

@@ -6,8 +6,8 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from workbench.console import out
 from workbench.diagnosis.result import Diagnosis, Suggestion
+from workbench.terminal import out
 
 MOST_MENDS = 6
 

@@ -32,9 +32,9 @@ def import_model(source: Path, directory: Path, actuated: tuple[str, ...]) -> No
     from rich.text import Text
 
     from workbench.commands.new import NAME
-    from workbench.console import out
     from workbench.importing.proposal import propose
     from workbench.importing.write import write_folder
+    from workbench.terminal import out
 
     if not NAME.fullmatch(directory.name):
         raise SpecError(f'DIR "{directory.name}"; allowed: letters, digits and _, first a letter, at most 40')
@@ -56,9 +56,9 @@ def print_proposal(path: Path, actuated: tuple[str, ...], everything: bool, json
     from rich.table import Table
     from rich.text import Text
 
-    from workbench.console import out
     from workbench.importing.proposal import propose
     from workbench.importing.write import robot_text
+    from workbench.terminal import out
 
     found = propose(path, actuated)
     if json:

@@ -139,9 +139,9 @@ def render(
 ) -> None:
     """Draw the robot without a screen: a picture of a pose, or a film of a case."""
     from workbench.commands.pictures import poses_of, positive, size_of
-    from workbench.console import out as console
     from workbench.rendering.files import check_target, write_pictures
     from workbench.rendering.offscreen import draw
+    from workbench.terminal import out as console
 
     positive("speed", speed)
     positive("fps", fps)

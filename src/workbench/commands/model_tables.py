@@ -11,10 +11,10 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from workbench.console import out
 from workbench.reference.check import JointRange, ModelCheck
 from workbench.robots.edit import EditResult
 from workbench.robots.show import ParameterRow
+from workbench.terminal import out
 
 LINES_SHOWN = 12
 """Numbers of changed lines that are listed one by one."""

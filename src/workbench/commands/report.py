@@ -24,9 +24,9 @@ def report(
     html: report.html. md: report.md with figures/*.svg. pdf: report.pdf, figures/*.pdf and tables/*.tex. csv, mat:
     data/, for other programs, with units.
     """
-    from workbench.console import Steps
     from workbench.report import build_report
     from workbench.report.kept_drawings import NAME as KEPT
+    from workbench.terminal import Steps
 
     formats = tuple(dict.fromkeys(format_ or ("html", "md")))
     with Steps("drawing figures, setting pages" if "pdf" in formats else "drawing figures") as show:

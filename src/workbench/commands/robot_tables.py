@@ -9,10 +9,10 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from workbench.console import out
 from workbench.library.page import freedoms, small, verified, workspace
 from workbench.library.record import LibraryRecord, RobotFigures
 from workbench.library.shelf import Entry
+from workbench.terminal import out
 
 
 def print_list(entries: Sequence[Entry], record: LibraryRecord) -> None:

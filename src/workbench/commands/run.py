@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -106,9 +107,11 @@ def run(
     from workbench.campaign.spec import campaign_names, load_campaign
     from workbench.commands.sweeps import dry_run as print_dry_run
     from workbench.commands.sweeps import report_apart, run_and_print
-    from workbench.console import CaseProgress, print_outcome
+    from workbench.console import print_outcome
+    from workbench.sweep.computing import SweepInterrupted
     from workbench.sweep.pick import pick_cases
-    from workbench.sweep.run import SweepInterrupted, SweepOptions
+    from workbench.sweep.resumable import SweepOptions
+    from workbench.terminal import CaseProgress
 
     if robots:
         others: dict[str, object] = {
@@ -131,11 +134,14 @@ def run(
     command = ["workbench", *sys.argv[1:]]
     spec, file = load_campaign(campaign)
     if spec.control is not None:
-        from workbench.commands.studies import refuse_options, run_study_and_print
+        from workbench.commands.studies import dry_run_study, refuse_options, run_study_and_print
 
-        given = {"only": only, "dry_run": dry_run, "good": good, "relative": relative, "scheduler": scheduler}
+        given = {"only": only, "good": good, "relative": relative}
         given |= {"quick": quick, "keep_going": keep_going, "engines": engines != "mujoco"}
         refuse_options(str(campaign), **given)
+        if dry_run:
+            dry_run_study(spec, file, model, values, jobs, candidates or (), controllers or ())
+            return
         try:
             code = run_study_and_print(
                 spec,
@@ -144,7 +150,7 @@ def run(
                 model=model,
                 settings=values,
                 command=command,
-                options=SweepOptions(jobs, None, fresh, retry_failed, replace),
+                options=SweepOptions(jobs, scheduler, fresh, retry_failed, replace),
                 candidates=candidates or (),
                 controllers=controllers or (),
                 report=report_apart,
@@ -185,6 +191,7 @@ def run(
             raise
     else:
         from workbench.diagnosis.brief import brief
+        from workbench.processes import cores
         from workbench.rendering.run_pictures import RunPictures
         from workbench.report import build_report
 
@@ -200,7 +207,7 @@ def run(
                 progress=progress,
                 report=build_report,
                 pictures=RunPictures() if pictures else None,
-                effort=effort,
+                effort=dataclasses.replace(effort, threads=cores()),  # one case after the other: each may take all
                 candidates=candidates or (),
                 pick=pick_cases,
                 explain=brief,

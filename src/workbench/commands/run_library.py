@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,13 +12,15 @@ from rich.text import Text
 
 from workbench.campaign.evidence import Effort
 from workbench.campaign.run import run_campaign
-from workbench.console import CONCLUSIONS, CaseProgress, err, out
+from workbench.console import CONCLUSIONS
 from workbench.errors import WorkbenchError
 from workbench.library.measure import figures_of
 from workbench.library.page import page, small
 from workbench.library.record import LibraryRecord, RobotFigures, read_record, record_path, write_record
 from workbench.library.shelf import entries
+from workbench.processes import cores
 from workbench.report import build_report
+from workbench.terminal import CaseProgress, err, out
 
 FAILED, BAD_INPUT, NOTHING_JUDGED = 1, 2, 4
 
@@ -69,7 +72,7 @@ def run_library(
                     command=command,
                     progress=progress,
                     report=build_report,
-                    effort=effort,
+                    effort=dataclasses.replace(effort, threads=cores()),
                     candidates=[str(path) for path in entry.formulas],
                     replace=replace,
                 )

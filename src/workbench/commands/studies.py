@@ -11,11 +11,17 @@ from rich.table import Table
 from rich.text import Text
 
 from workbench.campaign.spec import Campaign
-from workbench.commands.sweeps import SweepProgress
-from workbench.console import out, print_changes, print_conclusion
+from workbench.commands.sweeps import SweepProgress, duration, size
+from workbench.console import print_changes, print_conclusion
+from workbench.control.estimate import estimate_study
+from workbench.control.files import STUDY
+from workbench.control.plan import pairs_of
 from workbench.control.run import StudyOutcome, run_study
 from workbench.errors import SpecError
-from workbench.sweep.run import SweepOptions
+from workbench.sweep.resumable import SweepOptions
+from workbench.terminal import out
+
+PLURALS = {"controller with its model": "controllers with their models"}
 
 
 def refuse_options(campaign: str, **given: Any) -> None:
@@ -32,6 +38,33 @@ def refuse_options(campaign: str, **given: Any) -> None:
             raise SpecError(f"{campaign}: {option} does not go with a campaign that has [control]")
 
 
+def dry_run_study(
+    campaign: Campaign,
+    file: Path,
+    model: Path | None,
+    settings: Mapping[str, float],
+    jobs: int | None,
+    candidates: Sequence[str | Path] = (),
+    controllers: Sequence[str | Path] = (),
+) -> None:
+    """Print what a study is made of and would take; nothing is written."""
+    found = estimate_study(campaign, file, model, settings, jobs, candidates, controllers)
+    plan, spec = found.plan, found.plan.spec
+    parts = (
+        (len(campaign.case), "case"), (len(pairs_of(spec)), "controller with its model"), (len(spec.speeds), "speed"),
+        (len(spec.rates), "rate"), (len(spec.bandwidths), "bandwidth"),
+    )  # fmt: skip
+    words = [f"{n} {what if n == 1 else PLURALS.get(what, what + 's')}" for n, what in parts]
+    out.print(Text(f"{campaign.name}: {len(plan.loops)} runs, of {', '.join(words)}"), soft_wrap=True)
+    out.print(Text(f"  time: about {duration(found.seconds)} with {found.jobs} worker{'s' if found.jobs > 1 else ''}"))
+    out.print(
+        Text(f"  disk: about {size(found.bytes_at_end)}, {size(found.bytes_while_running)} while it runs"),
+    )
+    route = "" if spec.second_route == "all" else "; MuJoCo's own route is not run"
+    tried = f"{len(found.tried)} tried, at {', '.join(f'{loop.rate:.4g}' for loop in found.tried)} Hz"
+    out.print(Text(f"  {tried}: {found.tried_unstable} unstable, {found.tried_failed} not computed{route}"))
+
+
 def run_study_and_print(
     campaign: Campaign,
     file: Path,
@@ -46,7 +79,7 @@ def run_study_and_print(
     controllers: Sequence[str | Path] = (),
 ) -> int:
     """Run a study, write its report and print its outcome; return the exit code."""
-    with SweepProgress() as progress:
+    with SweepProgress(STUDY.parts) as progress:
         outcome = run_study(
             campaign,
             file,

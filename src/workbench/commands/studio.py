@@ -46,8 +46,8 @@ def studio(
 
     Nothing is loaded from the internet and no file is changed. Ctrl-C ends it.
     """
-    from workbench.console import out
     from workbench.errors import ParameterError
+    from workbench.terminal import out
 
     try:
         import viser  # noqa: F401

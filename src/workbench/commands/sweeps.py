@@ -19,11 +19,13 @@ from workbench.campaign.evidence import Effort, check_engines
 from workbench.campaign.margins import IN_SWEEPS
 from workbench.campaign.spec import Campaign
 from workbench.campaign.verdict import WITHOUT_BOUND
-from workbench.console import err, out, print_changes, print_conclusion
+from workbench.console import print_changes, print_conclusion
 from workbench.errors import OutputError
 from workbench.sweep.estimate import estimate
 from workbench.sweep.progress import Snapshot
-from workbench.sweep.run import SweepOptions, SweepOutcome, run_sweep
+from workbench.sweep.resumable import SweepOptions
+from workbench.sweep.run import SweepOutcome, run_sweep
+from workbench.terminal import err, out
 
 LINE_EVERY_S = 10.0
 """Seconds between lines of progress where there is no terminal."""
@@ -49,18 +51,19 @@ def size(bytes_: float) -> str:
     return f"{bytes_:.3g} {unit}"
 
 
-def plain_line(found: Snapshot) -> str:
-    """One line of progress."""
+def plain_line(found: Snapshot, parts: str = "cases") -> str:
+    """One line of progress; *parts* is what is counted."""
     troubles = [f"{n} {status}" for status, n in found.counts.items() if n and status != "passed"]
-    rate = [f"{found.rate:.1f} cases/s"] if found.rate else []
+    rate = [f"{found.rate:.1f} {parts}/s"] if found.rate else []
     left = [f"{duration(found.remaining_s)} left"] if found.remaining_s else []
-    return f"[{found.done}/{found.total}] " + (", ".join([*rate, *left, *troubles]) or "cases")
+    return f"[{found.done}/{found.total}] " + (", ".join([*rate, *left, *troubles]) or parts)
 
 
 class SweepProgress:
     """A bar with rate and time left on a terminal, a plain line now and then elsewhere."""
 
-    def __init__(self) -> None:
+    def __init__(self, parts: str = "cases") -> None:
+        self._parts = parts
         self._bar = Progress(
             TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[note]}"),
             console=err, transient=True, disable=not err.is_terminal,
@@ -72,7 +75,7 @@ class SweepProgress:
         """Start the bar."""
         if err.is_terminal:
             self._bar.start()
-        self._task = self._bar.add_task("cases", total=None, note="")
+        self._task = self._bar.add_task(self._parts, total=None, note="")
         return self
 
     def __exit__(
@@ -85,11 +88,11 @@ class SweepProgress:
     def __call__(self, found: Snapshot) -> None:
         """Show where the sweep stands."""
         if err.is_terminal:
-            note = plain_line(found).partition("] ")[2]
+            note = plain_line(found, self._parts).partition("] ")[2]
             self._bar.update(self._task, completed=found.done, total=found.total, note=note)
         elif time.monotonic() - self._said >= LINE_EVERY_S or (found.done == found.total != self._last):
             self._said, self._last = time.monotonic(), found.done
-            err.print(plain_line(found), markup=False)
+            err.print(plain_line(found, self._parts), markup=False)
 
 
 def dry_run(

@@ -52,8 +52,8 @@ def watch(
     from workbench.campaign.spec import load_campaign
     from workbench.campaign.user_candidates import load_candidates
     from workbench.compare.errors import all_worse
-    from workbench.console import out
     from workbench.errors import WorkbenchError
+    from workbench.terminal import out
 
     values, relative = settings(set_ or [])
     all_worse((), factor)
@@ -110,7 +110,7 @@ def _show(now: Errors, before: Errors | None, factor: float) -> None:
 
     from workbench.commands.change_table import LEGEND, change_table
     from workbench.compare.errors import all_worse, match_errors
-    from workbench.console import out
+    from workbench.terminal import out
 
     changes = [c for c in match_errors(before.rows if before else (), now.rows) if c.after is not None]
     out.print(change_table(changes, now.joints, factor, alone=before is None))

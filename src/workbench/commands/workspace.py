@@ -43,11 +43,12 @@ def workspace(
     from workbench.campaign.lock import locked
     from workbench.campaign.spec import load_campaign
     from workbench.capabilities.load import robot_with
-    from workbench.console import Steps, print_workspace
+    from workbench.console import print_workspace
     from workbench.report.workspace import draw_workspace
     from workbench.robots.assignments import resolve_changes
     from workbench.robots.catalogue import find_source
     from workbench.staging import check_output, staged
+    from workbench.terminal import Steps
     from workbench.workspace.grid import compute_workspace
     from workbench.workspace.store import WORKSPACE, refuse_other, workspace_facts, write_workspace
 

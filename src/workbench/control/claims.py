@@ -17,6 +17,7 @@ from workbench.control.names import NOT_RUN
 from workbench.control.plan import Loop
 
 HOLDS, REFUTED, UNDECIDED = "holds", "does not hold", "cannot be decided"
+NOT_ABOUT = "not about this robot"
 
 ROUTES = ("rms", "rms_halved", "rms_second")
 """Columns of the platform's error: the plant's step, half of it, MuJoCo's route."""
@@ -230,15 +231,23 @@ JUDGES: Mapping[str, Judge] = {
 }  # fmt: skip
 
 
-def judged(spec: ControlSpec, runs: Sequence[Known]) -> list[Verdict]:
-    """Judge every claim of a study, and each again with step, integrator and gains varied."""
+def judged(spec: ControlSpec, runs: Sequence[Known], others: Mapping[str, str] | None = None) -> list[Verdict]:
+    """Judge every claim of a study, and each again with step, integrator and gains varied.
+
+    *others* says, by case, in what its robot is another than the one that claims are about: those are not judged.
+    """
     found = []
     for claim in spec.claim:
+        why = [said for case, said in (others or {}).items() if not claim.cases or case in claim.cases]
+        if why:
+            said = "; ".join(dict.fromkeys(why))
+            found.append(Verdict(claim.id, claim.text, claim.source, NOT_ABOUT, said, {}, ""))
+            continue
         judge = JUDGES[claim.kind]
         verdict, sentence = judge(claim, points_of(claim, spec, runs))
-        others = {ROUTE_NAMES[route]: points_of(claim, spec, runs, route) for route in ROUTES[1:]}
+        varied = {ROUTE_NAMES[route]: points_of(claim, spec, runs, route) for route in ROUTES[1:]}
         for width in spec.bandwidths:
-            others[f"bandwidth {width:g} Hz"] = points_of(claim, spec, runs, bandwidth=width)
-        varied = {name: judge(claim, points)[0] if points else NOT_RUN for name, points in others.items()}
-        found.append(Verdict(claim.id, claim.text, claim.source, verdict, sentence, varied, claim.note))
+            varied[f"bandwidth {width:g} Hz"] = points_of(claim, spec, runs, bandwidth=width)
+        verdicts = {name: judge(claim, points)[0] if points else NOT_RUN for name, points in varied.items()}
+        found.append(Verdict(claim.id, claim.text, claim.source, verdict, sentence, verdicts, claim.note))
     return found

@@ -15,40 +15,31 @@ from workbench.arrays import FloatArray
 from workbench.campaign.cases import Course, course_of, resolve_case
 from workbench.campaign.control_spec import BUILT_IN, NO_MODEL
 from workbench.campaign.evidence import Effort
+from workbench.campaign.provenance import sha256
 from workbench.campaign.spec import Campaign, CaseSpec
 from workbench.campaign.user_candidates import load_candidates
 from workbench.capabilities.robot import Robot
 from workbench.control.controllers import Gains, Law, law_of
-from workbench.control.figures import Error, error_of, extrapolated
+from workbench.control.figures import Error, error_of
 from workbench.control.loop import TRACKED, Tracked, run_loop
 from workbench.control.models import FormulaModel
 from workbench.control.names import NOT_RUN
 from workbench.control.plan import Loop, StudyPlan, case_at, delay_of, overrides_of, plan_study, torque_limits
+from workbench.control.routes import Outcome, by_routes
 from workbench.control.sampling import Desired, Sampling, as_measured, desired_at_ticks
 from workbench.control.user_controller import UserController, load_controllers
 from workbench.errors import WorkbenchError
 from workbench.reference.forward import Plant
-from workbench.reference.replay import quiet
 from workbench.reference.stiff_plant import StiffPlant
-from workbench.sweep.evaluate import NO_MEMORY, Answer
+from workbench.sweep.evaluate import NO_MEMORY, Answer, Packed
 from workbench.sweep.identity import case_key, common_key
 from workbench.sweep.record import FAILED, INVALID, PASSED, Record, lost
-
-LONGEST_STEP = 1e-3
-"""s: the plant's own step where the control period is longer."""
-
-HALVED_TO = 2000.0
-"""Hz: up to this rate a run is made again at half the plant's step. Beyond, the step is shorter than 0.5 ms, where a
-half changes errors by less than a millionth (measured), and MuJoCo's route alone vouches for them."""
 
 LISTS = ("controllers", "models", "rates", "highest_rate", "bandwidths", "speeds")
 """What a study is a product of: a run knows its own, and a study that grows keeps what it has."""
 
 JUDGING = ("claim", "wanted", "enough", "time_limit", "memory_limit", "retries")
 """What changes no number of a run."""
-
-STIFF_STEP = 2.5e-4
-"""s: the second route's coarse step, or the control period."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +86,7 @@ class StudyContext:
     candidates: tuple[str, ...] = ()
     controllers: tuple[str, ...] = ()
 
-    def setup(self) -> Callable[[tuple[int, Loop]], Answer]:
+    def setup(self) -> Callable[[tuple[int, Loop]], Packed]:
         """Check that this process gives the same numbers as the one that asks, and return what computes a run.
 
         Raises
@@ -109,7 +100,7 @@ class StudyContext:
             raise WorkbenchError("model, formulas, code or versions of this worker are not those of the run")
         study = Study(plan, self.settings, own)
         study.bench(plan.loops[0])  # kernels are compiled before a run's time is taken
-        return partial(evaluate, study, self.common)
+        return partial(_packed, study, self.common)
 
 
 class Study:
@@ -178,24 +169,6 @@ class Study:
         )
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """One run by all routes."""
-
-    tracked: Tracked
-    """the plant's own step"""
-    desired: Desired
-    error: Error | None
-    """None where the run did not come to its end"""
-    halved: Error | None
-    """at half the step"""
-    second: Error | None
-    """MuJoCo's route at a step of zero, extrapolated"""
-    second_status: str
-    spread: float
-    """m: the platform's rms error by MuJoCo's route, at its fine step less extrapolated"""
-
-
 def compute(study: Study, loop: Loop) -> Outcome:
     """Run a loop by both routes.
 
@@ -207,33 +180,20 @@ def compute(study: Study, loop: Loop) -> Outcome:
     spec, bench = study.plan.spec, study.bench(loop)
     desired, x_desired = bench.desired(loop.rate)
     sampling = study.sampling(bench, loop)
-    step = spec.step or min(sampling.period, LONGEST_STEP)
+    seen = as_measured(desired, sampling)
 
-    def run(plant: Plant | StiffPlant, longest: float) -> Tracked:
-        return run_loop(plant, study.law(bench, loop, as_measured(desired, sampling)), desired, sampling, longest)
+    def run(plant: Plant | StiffPlant, step: float, times: int) -> Tracked:
+        return run_loop(plant, study.law(bench, loop, seen), desired, sampling, step, times)
 
     def error(q: FloatArray, x: FloatArray) -> Error:
         return error_of(q, desired.q, x, x_desired)
 
-    tracked = run(bench.plant, step)
-    own = error(tracked.q, tracked.x) if tracked.status == TRACKED else None
-    halved = None
-    if own and loop.rate <= HALVED_TO:
-        half = run(bench.plant, 0.5 * step)
-        halved = error(half.q, half.x) if half.status == TRACKED else None
-    if spec.second_route == "none":
-        return Outcome(tracked, desired, own, halved, None, NOT_RUN, math.nan)
-    coarse_step = min(sampling.period, STIFF_STEP)
-    with quiet():
-        bench.stiff.stiffen(coarse_step)
-        coarse = run(bench.stiff, coarse_step)
-        bench.stiff.stiffen(0.5 * coarse_step)
-        fine = run(bench.stiff, 0.5 * coarse_step)
-    if own is None or coarse.status != TRACKED or fine.status != TRACKED:
-        return Outcome(tracked, desired, own, halved, None, fine.status, math.nan)
-    second = error(extrapolated(coarse.q, fine.q), extrapolated(coarse.x, fine.x))
-    spread = abs(error(fine.q, fine.x).platform_rms - second.platform_rms)
-    return Outcome(tracked, desired, own, halved, second, TRACKED, spread)
+    both = spec.second_route == "all"
+    return by_routes(bench.plant, bench.stiff if both else None, run, error, sampling.period, spec.step)
+
+
+def _packed(study: Study, common: str, task: tuple[int, Loop]) -> Packed:
+    return evaluate(study, common, task).packed()
 
 
 def evaluate(study: Study, common: str, task: tuple[int, Loop]) -> Answer:
@@ -316,6 +276,6 @@ def study_key(
         "control": plan.spec.model_dump(exclude=set(LISTS + JUDGING)),
         "actuators": torque_limits(plan.campaign, plan.robot),
         "cases": [case.model_dump(exclude={"title", "description"}) for case in plan.campaign.case],
-        "controllers": {one.name: one.file.read_text(encoding="utf-8", errors="replace") for one in own},
+        "controllers": {one.name: [sha256(path.read_bytes()) for path in one.files] for one in own},
     }
     return case_key(keyed, content)

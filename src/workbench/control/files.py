@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,18 +11,17 @@ import pandas as pd
 from workbench.campaign import store
 from workbench.control.names import CONTROL, ERROR_COLUMNS, ERRORS, LOOP_COLUMNS, RUNS
 from workbench.control.plan import Loop
-from workbench.staging import DirectoryKind
 from workbench.sweep import files
 from workbench.sweep.journal import NAME as JOURNAL
 from workbench.sweep.journal import Journal
 from workbench.sweep.record import Record
+from workbench.sweep.resumable import Resumable
 
-FINISHED = (files.STATE, CONTROL, RUNS, ERRORS, JOURNAL, store.MANIFEST, *store.REPORTS)
-RUN = DirectoryKind(
-    what="run",
-    marker=files.STATE,
-    keys=frozenset({"format", "campaign", "versions"}),
-    members=(*FINISHED, files.PROGRESS, *(f".{name}.part" for name in FINISHED), f".{files.PROGRESS}.part"),
+STUDY = Resumable(
+    what="study",
+    parts="runs",
+    finished=(files.STATE, CONTROL, RUNS, ERRORS, JOURNAL, store.MANIFEST, *store.REPORTS),
+    results=RUNS,
 )
 
 
@@ -58,14 +56,6 @@ def write_tables(directory: Path, loops: Sequence[Loop], records: Sequence[Recor
 def write_journal(directory: Path, records: Sequence[Record]) -> None:
     """Write the journal again in the study's order: what is finished can be gone on with, and is the same bytes."""
     files.write_bytes(directory / JOURNAL, b"".join(record.line() for record in records))
-
-
-def clear(directory: Path) -> None:
-    """Remove what an earlier study computed; reports are written over."""
-    for name in (*FINISHED[:6], files.PROGRESS):
-        path = directory / name
-        if path.exists() or path.is_symlink():
-            os.unlink(path)
 
 
 def read_all(journal: Journal, count: int) -> list[Record]:

@@ -70,7 +70,7 @@ class Tracked:
     """J, of the actuators; exact for torques that are held"""
 
 
-def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, step: float) -> Tracked:
+def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, step: float, times: int = 1) -> Tracked:
     """Track a motion, beginning on it; before the first torque arrives the actuators give the same one.
 
     Parameters
@@ -85,6 +85,8 @@ def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, ste
         Delay, encoder, limits.
     step
         s, the longest step in time of the plant.
+    times
+        So many steps in place of each: 2 halves them all.
     """
     count, na = desired.q.shape
     period = sampling.period
@@ -92,10 +94,10 @@ def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, ste
     rest = sampling.delay - whole * period
     rest = 0.0 if rest < TICK * period else rest
     pieces = [piece for piece in (rest, period - rest) if piece > 0.0]
-    steps = [max(1, math.ceil(piece / step - TICK)) for piece in pieces]
+    steps = [times * max(1, math.ceil(piece / step - TICK)) for piece in pieces]
     scale = LOST * np.maximum(desired.stroke, SMALLEST_STROKE)
     plant.begin(desired.q[0], desired.qd[0])
-    encoder = Encoder(sampling, desired.qd[0])
+    encoder, furthest = Encoder(sampling, desired.qd[0]), scale.tolist()
     q, qd, tau = np.zeros((3, count, na))
     x = np.zeros((count, 3))
 
@@ -113,7 +115,8 @@ def run_loop(plant: Movable, law: Law, desired: Desired, sampling: Sampling, ste
     work, limited = 0.0, bool(np.isfinite(sampling.limit).any())
     for k in range(count):
         q[k], qd[k], x[k] = plant.q, plant.qd, plant.platform
-        if not bool((np.abs(q[k] - desired.q[k]) <= scale).all()):
+        away = (q[k] - desired.q[k]).tolist()
+        if not all(abs(off) <= most for off, most in zip(away, furthest, strict=True)):
             return ended_at(UNSTABLE, k, k, worst_of(q[k], k), "is off by more than its stroke")
         try:
             wanted = np.asarray(law(k, *encoder.measure(q[k], qd[k])), dtype=np.float64)

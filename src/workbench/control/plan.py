@@ -53,6 +53,13 @@ class StudyPlan:
         assert self.campaign.control is not None
         return self.campaign.control
 
+    def robots(self, settings: Mapping[str, float]) -> dict[str, Robot]:
+        """The robot of each case, as its models believe it."""
+        return {
+            case.name: self.robot.with_parameters(**overrides_of(self.campaign, self.robot, case, settings))
+            for case in self.campaign.case
+        }
+
 
 def plan_study(
     campaign: Campaign,

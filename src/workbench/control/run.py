@@ -11,31 +11,32 @@ from pathlib import Path
 from typing import Any
 
 from workbench.campaign import store
-from workbench.campaign.changes import Variant, changes_of
+from workbench.campaign.changes import Changes, Variant, changes_of
 from workbench.campaign.conclusion import FAILED, INCOMPLETE, PASSED, Conclusion
-from workbench.campaign.lock import locked
 from workbench.campaign.manifest import describe
 from workbench.campaign.replacing import request_of
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import full_names, load_candidates
+from workbench.capabilities.robot import Robot
 from workbench.control import files as study_files
-from workbench.control.claims import HOLDS, Known, Verdict, judged
+from workbench.control.claims import HOLDS, NOT_ABOUT, Known, Verdict, judged
 from workbench.control.evaluate import StudyContext, study_key
 from workbench.control.figures import is_decided
+from workbench.control.files import STUDY
 from workbench.control.names import CONTROL
 from workbench.control.plan import StudyPlan, plan_study, torque_limits
 from workbench.control.user_controller import load_controllers
-from workbench.errors import OutputError
-from workbench.staging import check_output
-from workbench.sweep import files, state
-from workbench.sweep.evaluate import Answer
+from workbench.sweep import files
+from workbench.sweep.computing import Work, compute_missing, start_pool
 from workbench.sweep.identity import case_key
+from workbench.sweep.inputs import inputs_of
 from workbench.sweep.journal import NAME as JOURNAL
 from workbench.sweep.journal import Journal
-from workbench.sweep.progress import Meter, Show
-from workbench.sweep.record import GOOD, Record, lost, parse_line
-from workbench.sweep.run import SYNC_EVERY_S, SweepInterrupted, SweepOptions, cores
-from workbench.sweep.supervisor import Supervisor
+from workbench.sweep.progress import Show
+from workbench.sweep.record import GOOD, Record, parse_line
+from workbench.sweep.resumable import Asked, SweepOptions, resumed
+
+NOTHING_CHANGED = Changes()
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def run_study(
     Raises
     ------
     WorkbenchError
-        Bad input, results of other versions, a full disk: one line.
+        Bad input, results of other versions, another run in the directory, a full disk: one line.
     SweepInterrupted
         Ctrl-C; finished runs are kept.
     """
@@ -89,62 +90,45 @@ def run_study(
     own_files = full_names(controllers)
     users, own = load_candidates(names), load_controllers(own_files)
     plan = plan_study(campaign, file, model, settings, users, own)
+    inputs = inputs_of(campaign, file, plan.model)
     common = study_key(plan, settings, users, own)
     context = StudyContext(campaign, file.resolve(), plan.model.resolve(), settings, common, names, own_files)
     request = {**request_of(model, settings, (), (), candidates), "controllers": sorted(map(str, controllers))}
-    with locked(directory):
-        try:
-            _prepare(directory, campaign.name, request, options)
-            study_files.write_journal(directory, _still_valid(directory, plan, common, options.retry_failed))
-            with Journal(directory / JOURNAL, len(plan.loops)) as journal:
-                computed = _compute(context, plan, journal, directory, options, show)
-                records = study_files.read_all(journal, len(plan.loops))
-            study_files.write_journal(directory, records)
-            study_files.write_tables(directory, plan.loops, records)
-            summary = summarise(plan, records)
-            manifest = _manifest(plan, summary, model, settings) | {
-                "command": shlex.join(command),
-                "request": request,
-                "started": started.isoformat(timespec="seconds"),
-                "finished": datetime.now(UTC).isoformat(timespec="seconds"),
-                "seconds": round(time.perf_counter() - clock, 3),
-                "computed": computed,
-                "engines": ["mujoco"],
-                "budget": plan.spec.second_route == "all",
-            }
-            files.write_json(directory / CONTROL, summary)
-            files.write_json(directory / store.MANIFEST, manifest)
-            (directory / files.PROGRESS).unlink(missing_ok=True)
-            if report:
-                report(directory)
-        except OSError as error:
-            raise OutputError(
-                f"{directory}: cannot be written: {error.strerror or error}; finished runs are kept",
-                path=str(directory),
-            ) from error
+    with resumed(STUDY, directory, len(plan.loops), Asked(campaign.name, request), options) as held:
+        study_files.write_journal(directory, _still_valid(directory, plan, common, options.retry_failed))
+        (directory / store.MANIFEST).unlink(missing_ok=True)
+        work = Work(
+            start=lambda tasks: start_pool(
+                context.setup, (plan.spec.time_limit, plan.spec.memory_limit, plan.spec.retries), options, tasks
+            ),
+            task=lambda index: (index, plan.loops[index]),
+            key=lambda index: case_key(common, vars(plan.loops[index])),
+        )
+        with Journal(directory / JOURNAL, len(plan.loops)) as journal:
+            computed = compute_missing(held, work, journal, inputs, show)
+            records = study_files.read_all(journal, len(plan.loops))
+        study_files.write_journal(directory, records)
+        study_files.write_tables(directory, plan.loops, records)
+        robots = plan.robots(settings)
+        variants = [Variant(case.name, robots[case.name], case.parameters) for case in campaign.case]
+        changes = changes_of(campaign, file, model, settings, (), variants)
+        summary = summarise(plan, records, changes)
+        manifest = _manifest(plan, summary, robots[campaign.case[0].name], changes) | {
+            "command": shlex.join(command),
+            "request": request,
+            "started": started.isoformat(timespec="seconds"),
+            "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+            "seconds": round(time.perf_counter() - clock, 3),
+            "computed": computed,
+            "engines": ["mujoco"],
+            "budget": plan.spec.second_route == "all",
+        }
+        files.write_json(directory / CONTROL, summary)
+        files.write_json(directory / store.MANIFEST, manifest)
+        held.complete((files.PROGRESS,))
+        if report:
+            report(directory)
     return StudyOutcome(directory, conclusion_of(summary), summary, manifest)
-
-
-def _prepare(directory: Path, name: str, request: Mapping[str, Any], options: SweepOptions) -> None:
-    if (directory / store.MANIFEST).exists() and not (directory / CONTROL).exists():
-        raise OutputError(
-            f"{directory}: holds a run of another kind; --out names another directory", path=str(directory)
-        )
-    check_output(directory, study_files.RUN)
-    old = files.read_json(directory / files.STATE) or {}
-    before = old.get("campaign")
-    if before not in (None, name) and not (options.fresh or options.replace):
-        raise OutputError(
-            f'{directory}: holds runs of campaign "{before}"; --replace puts this one in its place, --out names another'
-            " directory",
-            path=str(directory),
-        )
-    if options.fresh or (options.replace and before not in (None, name)):
-        study_files.clear(directory)
-    else:
-        state.refuse_other_versions(directory)
-    state.begin(directory, {"campaign": name, "request": dict(request)})
-    (directory / store.MANIFEST).unlink(missing_ok=True)
 
 
 def _still_valid(directory: Path, plan: StudyPlan, common: str, retry_failed: bool) -> list[Record]:
@@ -162,44 +146,6 @@ def _still_valid(directory: Path, plan: StudyPlan, common: str, retry_failed: bo
     return [replace(known[key], index=index) for index, key in keys if key in known]
 
 
-def _compute(
-    context: StudyContext, plan: StudyPlan, journal: Journal, directory: Path, options: SweepOptions, show: Show | None
-) -> int:
-    """Compute what the journal does not hold; return how many runs that was."""
-    counts, total, spec = journal.counts(), len(plan.loops), plan.spec
-    before = sum(counts.values())
-    meter = Meter(directory, before, total, counts, show)
-    if before == total:
-        return 0
-    pool = Supervisor(
-        max(1, min(options.jobs or cores(), total - before)),
-        context.setup,
-        spec.time_limit,
-        spec.memory_limit,
-        spec.retries,
-    )
-    synced = time.monotonic()
-    try:
-        for index, found in pool.run((index, (index, plan.loops[index])) for index in journal.missing()):
-            key = case_key(context.common, vars(plan.loops[index]))
-            record = found.record if isinstance(found, Answer) else lost(index, key, found.status, found.reason)
-            journal.append(record)
-            meter.count(record.status)
-            if time.monotonic() - synced > SYNC_EVERY_S:
-                journal.sync()
-                synced = time.monotonic()
-    except KeyboardInterrupt:
-        done = sum(journal.counts().values())
-        journal.sync()
-        raise SweepInterrupted(
-            f"{done} of {total} runs are finished and kept in {directory}; the same command goes on with the rest"
-        ) from None
-    finally:
-        pool.close()
-    meter.tell(force=True)
-    return total - before
-
-
 def known_runs(plan: StudyPlan, records: Sequence[Record]) -> list[Known]:
     """What the claims are judged by: finished runs, those that are unstable without errors."""
     found = []
@@ -212,10 +158,14 @@ def known_runs(plan: StudyPlan, records: Sequence[Record]) -> list[Known]:
     return found
 
 
-def summarise(plan: StudyPlan, records: Sequence[Record]) -> dict[str, Any]:
-    """What stands in ``control.json``: counts, how well errors are known, claims with their verdicts."""
+def summarise(plan: StudyPlan, records: Sequence[Record], changes: Changes = NOTHING_CHANGED) -> dict[str, Any]:
+    """What stands in ``control.json``: counts, how well errors are known, claims with their verdicts.
+
+    A claim about a case whose robot is another than the published one is not judged.
+    """
     runs = known_runs(plan, records)
-    verdicts = judged(plan.spec, runs)
+    others = {case.name: changes.why_not(case.name) for case in plan.campaign.case}
+    verdicts = judged(plan.spec, runs, {case: why for case, why in others.items() if why})
     unstable = [record for record in records if record.status in GOOD and not record.rows]
     undecided = [run for run in runs if run.errors and not _is_known(run, plan.spec.second_route == "all")]
     failed = [record for record in records if record.status not in GOOD]
@@ -254,19 +204,17 @@ def conclusion_of(summary: Mapping[str, Any]) -> Conclusion:
         status = FAILED if summary["failed"] == summary["runs"] else INCOMPLETE
         return Conclusion(status, f"{runs}{known}; {summary['failed']} could not be computed: {summary['reasons'][0]}")
     claims: Sequence[Mapping[str, Any]] = summary["claims"]
-    said = f"; {sum(c['verdict'] == HOLDS for c in claims)} of {len(claims)} claims hold" if claims else ""
-    return Conclusion(PASSED, f"{runs}{known}{said}")
+    here = [claim["verdict"] for claim in claims if claim["verdict"] != NOT_ABOUT]
+    said = f"; {here.count(HOLDS)} of {len(here)} claims hold" if here else ""
+    apart = len(claims) - len(here)
+    others = f"; {apart} {'claim is' if apart == 1 else 'claims are'} {NOT_ABOUT}" if apart else ""
+    return Conclusion(PASSED, f"{runs}{known}{said}{others}")
 
 
-def _manifest(
-    plan: StudyPlan, summary: Mapping[str, Any], model: Path | None, settings: Mapping[str, float]
-) -> dict[str, Any]:
+def _manifest(plan: StudyPlan, summary: Mapping[str, Any], robot: Robot, changes: Changes) -> dict[str, Any]:
     campaign = plan.campaign
-    first = campaign.case[0]
-    variant = Variant(first.name, plan.robot, first.parameters)
-    changes = changes_of(campaign, plan.file, model, settings, (), [variant])
     found = conclusion_of(summary)
-    return describe(campaign, plan.file, plan.model, plan.robot, first.name, changes) | {
+    return describe(campaign, plan.file, plan.model, robot, campaign.case[0].name, changes) | {
         "format": store.FORMAT,
         "status": found.status,
         "verdict": found.sentence,

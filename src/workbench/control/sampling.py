@@ -92,6 +92,7 @@ class Encoder:
         self._before: FloatArray | None = None
         self._first_rate = first_rate.copy()
         self._counts = sampling.resolution > 0.0
+        self._all, self._some = bool(self._counts.all()), bool(self._counts.any())
         self._noisy = bool(sampling.noise.any())
 
     def measure(self, q: FloatArray, qd: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -100,9 +101,11 @@ class Encoder:
         seen = q.copy()
         if self._noisy:
             seen += sampling.noise * self._random.standard_normal(len(q))
-        if self._counts.any():
+        if self._all:
+            seen = np.rint(seen / sampling.resolution) * sampling.resolution
+        elif self._some:
             counts = self._counts
-            seen[counts] = np.round(seen[counts] / sampling.resolution[counts]) * sampling.resolution[counts]
+            seen[counts] = np.rint(seen[counts] / sampling.resolution[counts]) * sampling.resolution[counts]
         if sampling.ideal_rate:
             return seen, qd.copy()
         rate = self._first_rate if self._before is None else (seen - self._before) * sampling.rate

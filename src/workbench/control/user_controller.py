@@ -25,7 +25,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.campaign.bounded_call import UnrulyError, bounded, said
 from workbench.campaign.control_spec import BUILT_IN
-from workbench.campaign.formula_files import Siblings, load_module
+from workbench.campaign.formula_files import Siblings, files_of, load_module
 from workbench.control.controllers import Gains, Law, Model
 from workbench.control.sampling import Desired
 from workbench.errors import CandidateError, SpecError
@@ -80,6 +80,11 @@ class UserController:
     file: Path
     line: int
     siblings: Siblings | None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file and those beside it that it has imported."""
+        return files_of(self.file, self.siblings)
 
     def law(
         self, parameters: Any, joints: tuple[str, ...], model: Model | None, gains: Gains, desired: Desired, rate: float

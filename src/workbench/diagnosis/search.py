@@ -8,7 +8,6 @@ Edits run in supervised workers, as sweeps do, each with a time limit; whatever 
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
@@ -26,6 +25,7 @@ from workbench.diagnosis.subject import Subject
 from workbench.diagnosis.suggestions import suggested
 from workbench.diagnosis.trial import FIRST, NOTHING, Paper, Score, Setup, Task, nothing_right
 from workbench.errors import WorkbenchError
+from workbench.processes import cores
 from workbench.sweep.supervisor import Lost, Supervisor
 
 BEAM = 4
@@ -74,7 +74,7 @@ def search_mends(
     deadline = time.monotonic() + time_limit
     paper = make_paper(subject, seen)
     lines, groups, missing = lines_run(subject, seen.plan), groups_of(subject.parameters), missing_in(seen)
-    supervisor = Supervisor(jobs or _cores(), Setup(paper), 60.0, MEMORY_MB, 0)
+    supervisor = Supervisor(jobs or cores(), Setup(paper), 60.0, MEMORY_MB, 0)
     with closing(supervisor):
         joints = len(subject.joints)
         search = _Search(supervisor, paper, deadline, lambda text: edits_of(text, lines, groups, joints, missing))
@@ -82,10 +82,6 @@ def search_mends(
             return search.run(text, str(source.file))
         except WorkbenchError as error:
             return [], (f"No edits are looked for: {error}.",)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 Place = tuple[int, int, int, str]

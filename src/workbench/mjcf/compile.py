@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import warnings
-from collections.abc import Iterator
 from pathlib import Path
 
 import mujoco
@@ -13,6 +11,7 @@ import numpy as np
 from workbench.data_files import bundled
 from workbench.errors import ModelError, WorkbenchError
 from workbench.limits import LARGEST_NUMBER
+from workbench.mjcf.engine_warnings import engine_warnings
 
 FINITE = (
     "qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
@@ -47,23 +46,6 @@ def find_model(path: str | Path) -> Path:
     raise ModelError(f"{path}: no such model file", file=str(path))
 
 
-@contextlib.contextmanager
-def engine_warnings() -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings; left alone it prints them and writes a log file into the current directory.
-
-    Those of a specification's own ``compile`` come as Python's UserWarning, and are dropped.
-    """
-    collected: list[str] = []
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(collected.append)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            yield collected
-    finally:
-        mujoco.set_mju_user_warning(before)
-
-
 def compile_spec(spec: mujoco.MjSpec, file: str) -> mujoco.MjModel:
     """Compile a specification.
 
@@ -79,6 +61,8 @@ def compile_spec(spec: mujoco.MjSpec, file: str) -> mujoco.MjModel:
         raise ModelError(f"{file}: MuJoCo does not compile it: {error}", file=file) from error
     numbers = [(name, getattr(model, name)) for name in FINITE]
     numbers += [(f"option {name}", np.atleast_1d(getattr(model.opt, name))) for name in FINITE_OPTIONS]
+    if np.abs(np.concatenate([values.ravel() for _, values in numbers])).max() <= LARGEST_NUMBER:
+        return model
     for name, values in numbers:
         if values.size and not np.abs(values).max() <= LARGEST_NUMBER:
             raise ModelError(

@@ -10,7 +10,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.mjcf.assets import parse
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.engine_warnings import engine_warnings
 from workbench.mjcf.source import Source
 
 NAMED = 4

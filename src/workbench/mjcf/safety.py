@@ -8,6 +8,7 @@ A model is refused for it before MuJoCo sees it, in one line that names the file
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from workbench.errors import ModelError
 
@@ -88,6 +89,8 @@ def refuse_element(tag: str, attributes: dict[str, str], depth: int, count: int,
     if tag in REFUSED_TAGS:
         raise ModelError(f"{where}: <{tag}> {REFUSED_TAGS[tag]}", element=tag)
     for key, value in attributes.items():
+        if not _watched(tag, key):
+            continue
         if key.startswith("file") and tag not in READERS:
             raise ModelError(f'{where}: <{tag} {key}="{_short(value)}"> reads another file', element=tag, attribute=key)
         limit = LARGEST.get(key) or LARGEST_OF_TAG.get((tag, key)) or (LARGEST_USER if key[:6] == "nuser_" else None)
@@ -97,6 +100,13 @@ def refuse_element(tag: str, attributes: dict[str, str], depth: int, count: int,
             )
         if (tag, key) == ("size", "memory") and _memory(value) > LARGEST_MEMORY:
             raise ModelError(f'{where}: <size memory="{_short(value)}">; allowed: at most 1G', element=tag)
+
+
+@lru_cache(maxsize=4096)
+def _watched(tag: str, key: str) -> bool:
+    """Whether `refuse_element` looks at the values of an attribute."""
+    limited = key in LARGEST or (tag, key) in LARGEST_OF_TAG or key[:6] == "nuser_"
+    return limited or key.startswith("file") or (tag, key) == ("size", "memory")
 
 
 def not_finite(attributes: dict[str, str]) -> tuple[str, str] | None:

@@ -162,7 +162,7 @@ class _Check:
             found = [_forces(seen, one[0], one[1]), _forces(prepared, two[0], two[1])]
             for what, first, second in zip(("mass matrix", "bias forces", "passive forces"), *found, strict=True):
                 moved = turn.T @ first @ turn if first.ndim == 2 else turn.T @ first
-                scale = max(float(np.abs(moved).max(initial=0.0)), float(np.abs(second).max(initial=0.0)), 1e-300)
+                scale = max(float(np.abs(moved).max(initial=0.0)), float(np.abs(second).max(initial=0.0)))
                 gap = np.abs(moved - second)
                 if not gap.max(initial=0.0) <= SAME * scale:
                     dof = int(np.unravel_index(int(gap.argmax()), gap.shape)[0])

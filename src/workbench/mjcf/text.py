@@ -8,14 +8,20 @@ from __future__ import annotations
 
 import re
 import xml.parsers.expat as expat
+from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from typing import NamedTuple
 
 from workbench.errors import ModelError
 from workbench.mjcf.safety import not_finite, refuse_element
 
 TAG = re.compile(r"""<[^\s/>]+(?:\s+[^\s=/>]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*/?>""")
 ATTRIBUTE = re.compile(r"""([^\s=<>/]+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
-SUSPECT = re.compile(r"nan|inf", re.IGNORECASE)
+TOKEN = re.compile(r"\S+")
+SUSPECT = ("nan", "inf")
 
 SECTIONS = {"option": "option"}
 """Section in which an element that carries parameters stands; ``worldbody`` where not said. Other sections use some of
@@ -25,8 +31,7 @@ PLAIN_DIGITS = 17
 """Significant digits that every double fits into; a longer token holds more than the double (`precise`)."""
 
 
-@dataclass(frozen=True)
-class Element:
+class Element(NamedTuple):
     """One start tag: its name, the body that holds it, the section it stands in, and where its text lies."""
 
     tag: str
@@ -57,7 +62,19 @@ class Edit:
     """True: passed over where the file does not write it"""
 
 
-def scan(text: str, file: str, included: bool = False) -> list[Element]:
+class Elements(list[Element]):
+    """What `scan` found, in the order of the text; not to be changed."""
+
+    @cached_property
+    def places(self) -> dict[tuple[str, str, str], Element]:
+        """The first element of each tag, section and name (`_called`)."""
+        found: dict[tuple[str, str, str], Element] = {}
+        for element in self:
+            found.setdefault((element.tag, element.section, _called(element)), element)
+        return found
+
+
+def scan(text: str, file: str, included: bool = False) -> Elements:
     """List the start tags of an MJCF text; of one that is *included*, the root may have any name.
 
     Raises
@@ -73,7 +90,8 @@ def scan(text: str, file: str, included: bool = False) -> list[Element]:
     path: list[tuple[str, int]] = []
     names: set[str] = set()
     suspects: list[tuple[str, str, str, int]] = []
-    suspicious = SUSPECT.search(text) is not None
+    lower = text.lower()
+    suspicious = any(word in lower for word in SUSPECT)
     parser = expat.ParserCreate("utf-8")
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
@@ -116,31 +134,31 @@ def scan(text: str, file: str, included: bool = False) -> list[Element]:
 
 def _located(
     text: str, raw: bytes, found: list[tuple[str, str, str, str, int, int]], ends: dict[int, int], file: str
-) -> list[Element]:
+) -> Elements:
     """Turn byte offsets into places in the text."""
-    places = _places(text, raw, sorted({offset for *_, offset, _ in found} | set(ends.values())))
-    elements = []
+    at = _places(text, raw, sorted({offset for *_, offset, _ in found} | set(ends.values())))
+    elements = Elements()
     for number, (tag, name, body, section, offset, line) in enumerate(found):
-        start, close = places[offset], places[ends[number]]
+        start, close = at(offset), at(ends[number])
         match = TAG.match(text, start)
         if match is None:  # expat accepted it, so this is a form of tag that no MJCF uses
             raise ModelError(f"{file}:{line}: cannot read the tag <{tag}>", file=file)
-        alone = match.group().endswith("/>")
-        close, stop = (match.end(),) * 2 if alone else (close, text.index(">", close) + 1)
-        elements.append(Element(tag, name, body, section, start, match.end(), line, close, stop))
+        end = match.end()
+        close, stop = (end, end) if text[end - 2] == "/" else (close, text.index(">", close) + 1)
+        elements.append(Element(tag, name, body, section, start, end, line, close, stop))
     return elements
 
 
-def _places(text: str, raw: bytes, offsets: list[int]) -> dict[int, int]:
+def _places(text: str, raw: bytes, offsets: list[int]) -> Callable[[int], int]:
     """Places in the text of sorted byte offsets."""
     if len(text) == len(raw):
-        return {offset: offset for offset in offsets}
+        return int
     places, place, before = {}, 0, 0
     for offset in offsets:
         place += len(raw[before:offset].decode())
         before = offset
         places[offset] = place
-    return places
+    return places.__getitem__
 
 
 def find(elements: list[Element], tag: str, name: str) -> Element | None:
@@ -150,6 +168,9 @@ def find(elements: list[Element], tag: str, name: str) -> Element | None:
     is.
     """
     section = SECTIONS.get(tag, "worldbody")
+    if isinstance(elements, Elements) and tag != "option":
+        known = elements.places.get((tag, section, name))
+        return known or (_only_geom(elements, name) if tag == "geom" and name else None)
     for element in reversed(elements) if tag == "option" else elements:
         if element.tag == tag and element.section == section and _called(element) == name:
             return element
@@ -166,14 +187,28 @@ def written(text: str, elements: list[Element], tag: str, name: str, attribute: 
 
     Without an ``<inertial>`` a body's mass is that of its only geom; its inertia may be written as ``fullinertia``.
     """
+    found = _written(text, elements, tag, name, attribute)
+    return found[:2] if found else None
+
+
+def numbers_written(text: str, elements: list[Element], tag: str, name: str, attribute: str) -> int:
+    """How many numbers stand where `written` finds an attribute; 0 where it finds none."""
+    found = _written(text, elements, tag, name, attribute)
+    return len(text[slice(*found[2])].split()) if found else 0
+
+
+def _written(
+    text: str, elements: list[Element], tag: str, name: str, attribute: str
+) -> tuple[Element, str, tuple[int, int]] | None:
     element = find(elements, tag, name)
     if element is None and (tag, attribute) == ("inertial", "mass"):
         element = _only_geom(elements, name)
     if element is None:
         return None
     for spelt in (attribute, *(["fullinertia"] if attribute == "diaginertia" else [])):
-        if attribute_span(text, element, spelt) is not None:
-            return element, spelt
+        span = attribute_span(text, element, spelt)
+        if span is not None:
+            return element, spelt, span
     return None
 
 
@@ -188,6 +223,8 @@ def _called(element: Element) -> str:
 
 def attribute_span(text: str, element: Element, attribute: str) -> tuple[int, int] | None:
     """Where the value of an attribute lies in the text, without its quotes; None where it is missing."""
+    if text.find(attribute, element.start, element.end) < 0:
+        return None
     for match in ATTRIBUTE.finditer(text, element.start, element.end):
         if match.group(1) == attribute:
             return match.span(2 if match.group(2) is not None else 3)
@@ -199,7 +236,7 @@ def tokens(text: str, element: Element, attribute: str) -> list[tuple[int, int, 
     span = attribute_span(text, element, attribute)
     if span is None:
         return []
-    return [(m.start(), m.end(), m.group()) for m in re.compile(r"\S+").finditer(text, *span)]
+    return [(m.start(), m.end(), m.group()) for m in TOKEN.finditer(text, *span)]
 
 
 def replace_numbers(text: str, file: str, changes: list[Edit], elements: list[Element] | None = None) -> str:
@@ -219,7 +256,14 @@ def replace_numbers(text: str, file: str, changes: list[Edit], elements: list[El
     ModelError
         An element or attribute that is missing, or has too few numbers.
     """
-    elements = scan(text, file) if elements is None else elements
+    return numbers_replaced(text, file, changes, scan(text, file) if elements is None else elements)[0]
+
+
+def numbers_replaced(text: str, file: str, changes: list[Edit], elements: list[Element]) -> tuple[str, Elements]:
+    """`replace_numbers`, and what `scan` finds in the new text.
+
+    Only numbers change, so tags, names and lines are those of *elements*, moved along.
+    """
     edits: dict[tuple[int, int], str] = {}
     for change in changes:
         place = written(text, elements, change.tag, change.name, change.attribute)
@@ -238,9 +282,26 @@ def replace_numbers(text: str, file: str, changes: list[Edit], elements: list[El
             )
         if change.token or not _holds(old, change.value):
             edits[start, end] = change.token or number(change.value)
-    for (start, end), token in sorted(edits.items(), reverse=True):
-        text = text[:start] + token + text[end:]
-    return text
+    ordered = sorted(edits.items())
+    pieces, last = [], 0
+    for (start, end), token in ordered:
+        pieces += [text[last:start], token]
+        last = end
+    return "".join([*pieces, text[last:]]), _moved(elements, ordered)
+
+
+def _moved(elements: list[Element], edits: list[tuple[tuple[int, int], str]]) -> Elements:
+    """Elements of a text in which tokens, which lie inside of tags, are replaced by others."""
+    ends = [end for (_, end), _ in edits]
+    shifts = [0, *accumulate(len(token) - (end - start) for (start, end), token in edits)]
+
+    def at(place: int) -> int:
+        return place + shifts[bisect_right(ends, place)] if place >= 0 else place
+
+    return Elements(
+        Element(e.tag, e.name, e.body, e.section, at(e.start), at(e.end), e.line, at(e.close), at(e.stop))
+        for e in elements
+    )
 
 
 def _not_written(text: str, file: str, change: Edit, elements: list[Element], some: bool) -> ModelError:

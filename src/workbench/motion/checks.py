@@ -30,6 +30,8 @@ def as_number(what: str, value: Any, unit: str, minimum: float = -math.inf, mini
     MotionError
         Not a number, not finite, or too small; the facts hold ``value``.
     """
+    if type(value) is float and minimum < value < math.inf:
+        return value
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
         raise MotionError(f"{what} = {value!r}; allowed: a number", value=value)
     try:
@@ -50,6 +52,8 @@ def as_list(what: str, value: Any, entries: str = "numbers") -> list[Any]:
     MotionError
         Anything else, a text included.
     """
+    if type(value) in (list, tuple):
+        return list(value)
     if isinstance(value, str) or not isinstance(value, Sequence | np.ndarray) or getattr(value, "ndim", 1) == 0:
         raise MotionError(f"{what} = {value!r}; allowed: a list of {entries}", value=value)
     return list(value)
@@ -67,4 +71,6 @@ def as_vector(what: str, value: Any, unit: str, length: int | None = None) -> li
     if not entries or (length is not None and len(entries) != length):
         allowed = "one or more" if length is None else length
         raise MotionError(f"{what} has {len(entries)} entries; allowed: {allowed}", value=len(entries))
+    if all(type(entry) is float and math.isfinite(entry) for entry in entries):
+        return entries
     return [as_number(f"{what}, entry {number}", entry, unit) for number, entry in enumerate(entries, start=1)]

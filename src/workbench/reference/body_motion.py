@@ -17,6 +17,9 @@ from workbench.errors import ParameterError
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.reference.result import ReferenceResult
 
+BLOCK = 512
+"""Samples whose Jacobians are held at a time, some 20 kB each."""
+
 
 @dataclass(frozen=True)
 class BodyMotion:
@@ -99,24 +102,32 @@ def body_motion(
     spin, carried_l, carried_a = np.zeros((3, n, nb, 3))
     axes = np.zeros((n, nb, 3, 3))
     springs, dampers, fluid = np.zeros((3, n, model.nv))
-    point_jac, turn_jac, point_dot, turn_dot = (np.zeros((3, model.nv)) for _ in range(4))
+    kept = min(n, BLOCK)
+    point_jac, turn_jac, point_dot, turn_dot = np.zeros((4, kept, nb, 3, model.nv))
     # qacc = W qdd + what the loops need at qdd = 0
     carried = result.qacc - np.einsum("nva,na->nv", tangent, np.asarray(qdd, dtype=np.float64))
-    for sample in range(n):
-        data.qpos[:], data.qvel[:] = result.qpos[sample], result.qvel[sample]
-        mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fwdVelocity(model, data)
-        springs[sample], dampers[sample], fluid[sample] = data.qfrc_spring, data.qfrc_damper, data.qfrc_fluid
-        positions, frames = (data.xipos, data.ximat) if centres else (data.xpos, data.xmat)
-        axes[sample] = frames[1:].reshape(nb, 3, 3)
-        for body in range(1, model.nbody):
-            mujoco.mj_jac(model, data, point_jac, turn_jac, positions[body], body)
-            mujoco.mj_jacDot(model, data, point_dot, turn_dot, positions[body], body)
-            linear[sample, body - 1] = point_jac @ tangent[sample]
-            angular[sample, body - 1] = turn_jac @ tangent[sample]
-            spin[sample, body - 1] = turn_jac @ data.qvel
-            carried_l[sample, body - 1] = point_jac @ carried[sample] + point_dot @ data.qvel
-            carried_a[sample, body - 1] = turn_jac @ carried[sample] + turn_dot @ data.qvel
+    positions, frames = (data.xipos, data.ximat) if centres else (data.xpos, data.xmat)
+    for first in range(0, n, BLOCK):
+        rows = slice(first, min(first + BLOCK, n))
+        for k, sample in enumerate(range(rows.start, rows.stop)):
+            data.qpos[:], data.qvel[:] = result.qpos[sample], result.qvel[sample]
+            mujoco.mj_fwdPosition(model, data)
+            mujoco.mj_fwdVelocity(model, data)
+            springs[sample], dampers[sample], fluid[sample] = data.qfrc_spring, data.qfrc_damper, data.qfrc_fluid
+            axes[sample] = frames[1:].reshape(nb, 3, 3)
+            for body in range(nb):
+                place = positions[body + 1]
+                mujoco.mj_jac(model, data, point_jac[k, body], turn_jac[k, body], place, body + 1)
+                mujoco.mj_jacDot(model, data, point_dot[k, body], turn_dot[k, body], place, body + 1)
+        count = rows.stop - rows.start
+        rates, held = result.qvel[rows, None, :, None], carried[rows, None, :, None]
+        for jac, dot, folded, without in (
+            (point_jac[:count], point_dot[:count], linear, carried_l),
+            (turn_jac[:count], turn_dot[:count], angular, carried_a),
+        ):
+            folded[rows] = jac @ tangent[rows, None]
+            without[rows] = (jac @ held + dot @ rates)[..., 0]
+        spin[rows] = (turn_jac[:count] @ rates)[..., 0]
     qdd = np.asarray(qdd, dtype=np.float64)
     return BodyMotion(
         names=tuple(model.body(body).name or f"#{body}" for body in range(1, model.nbody)),

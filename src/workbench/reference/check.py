@@ -15,7 +15,8 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError, WorkbenchError
-from workbench.mjcf.compile import custom_text, engine_warnings
+from workbench.mjcf.compile import custom_text
+from workbench.mjcf.engine_warnings import engine_warnings
 from workbench.reference.closure import LoopCloser, constraint_jacobian
 from workbench.reference.engine import Engine
 from workbench.reference.result import Mobility

@@ -6,21 +6,21 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.reference.mujoco_reference import MujocoReference
-from workbench.reference.power_terms import Terms, terms_of
+from workbench.reference.power_terms import further_losses
 from workbench.reference.result import ReferenceResult
 
 ENERGY_ROUNDING = 1e-13
 """Of the energy: what its rounding may pretend between two samples."""
 
 
-def losses(reference: MujocoReference, mass_model: str, qvel: FloatArray, terms: Terms) -> FloatArray:
-    """What friction, damping and other passive forces take, ``(m,)`` in watts, at velocities ``(m, nv)``."""
+def losses(reference: MujocoReference, mass_model: str, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
+    """What friction, damping and other passive forces take, ``(m,)`` in watts, at ``(m, nq)`` and ``(m, nv)``."""
     model, rub = reference.compiled(mass_model), reference.structure.friction
     dry = rub.passive.copy()
     dry[reference.structure.actuated] = rub.actuated
     taken: FloatArray = qvel**2 @ np.asarray(model.dof_damping) + np.abs(qvel) @ dry
     taken = taken + np.abs(qvel @ rub.tendon_rows.T) @ rub.tendon
-    return taken + terms.further_losses
+    return taken + further_losses(model, qpos, qvel)
 
 
 def energy_jump(
@@ -38,8 +38,7 @@ def energy_jump(
     """
     if len(t) < 2:
         return 0.0
-    terms = terms_of(reference.compiled(mass_model), result.qpos, result.qvel, result.qacc)
-    lost = losses(reference, mass_model, result.qvel, terms)
+    lost = losses(reference, mass_model, result.qpos, result.qvel)
     put_in = power + np.sum(force * result.xd, axis=1) - lost
     change = np.diff(result.energy.sum(axis=1)) / np.diff(t)
     around = np.stack([np.roll(put_in, shift) for shift in (1, 0, -1, -2)])

@@ -20,7 +20,7 @@ from mujoco.batch import Batch
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError, ParameterError
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.engine_warnings import EvaluationWarnings, engine_warnings
 from workbench.reference.frames import Frames, place_frames
 from workbench.reference.shelf import Shelf
 
@@ -36,6 +36,9 @@ NONE = Frames.of([])
 
 BLOCK = 512
 """Samples evaluated at a time; some 3 kB each."""
+
+SMALL = 128
+"""Samples for which a short batch, such as the home pose, makes room: memory that is never used is not free."""
 
 MOST_THREADS = 256
 
@@ -124,24 +127,38 @@ POSES = ("cdof", "subtree_com", "site_xpos", "site_xquat", "xanchor")
 DYNAMICS = ("cdof_dot", "M", "qfrc_bias", "qfrc_passive", "xipos", "energy")
 
 
-class Evaluator:
-    """Evaluates up to `BLOCK` samples at a time; one thread's own."""
+class ShapedBatch(Batch):  # type: ignore[misc]  # mujoco.batch comes without types
+    """A batch that is told the shapes of MuJoCo's arrays: its own way to them takes longer than a short batch."""
 
-    def __init__(self, model: mujoco.MjModel, frames: Frames = NONE) -> None:
-        self._batch = Batch(model, BLOCK, 1)
+    def __init__(self, model: mujoco.MjModel, room: int, shapes: mujoco.MjData) -> None:
+        self._shapes = shapes
+        super().__init__(model, room, 1)
+
+    @property
+    def _data(self) -> mujoco.MjData:
+        return self._shapes
+
+
+class Evaluator:
+    """Evaluates up to *room* samples at a time; one thread's own."""
+
+    def __init__(self, model: mujoco.MjModel, frames: Frames, room: int, shapes: mujoco.MjData) -> None:
+        self.room = room
+        """samples that it evaluates at a time"""
+        self._batch = ShapedBatch(model, room, shapes)
         self.model = model
         """the model that is evaluated, a `lean` one"""
         self._poses = Poses(*(self._batch.bind(name) for name in POSES))
         self._dynamics = Dynamics(*(self._batch.bind(name) for name in DYNAMICS))
         self.qpos: FloatArray = self._batch.qpos
-        """the configurations that `place` evaluates, ``(BLOCK, nq)``, to be written into"""
+        """the configurations that `place` evaluates, ``(room, nq)``, to be written into"""
         self._qvel = self._batch.qvel
-        self._all = np.arange(BLOCK, dtype=np.int32)
+        self._all = np.arange(room, dtype=np.int32)
         self._frames = frames
         if len(frames):
             self._bodies = self._batch.bind("xpos"), self._batch.bind("xquat")
             self._sites = self._poses.site_xpos, self._poses.site_xquat
-            self._places = tuple(np.zeros((BLOCK, model.nsite + len(frames), width)) for width in (3, 4))
+            self._places = tuple(np.zeros((room, model.nsite + len(frames), width)) for width in (3, 4))
             # for the kernels, arrays that may not be written to are another type; the engine's own may not
             shown = [array.view() for array in self._places]
             for array in shown:
@@ -174,7 +191,7 @@ class Evaluator:
         return self._poses
 
     def move(self, qpos: FloatArray, qvel: FloatArray) -> tuple[Poses, Dynamics]:
-        """Evaluate states ``(k, nq)``, ``(k, nv)``, k <= `BLOCK`; the arrays are valid until the next call."""
+        """Evaluate states ``(k, nq)``, ``(k, nv)``, k <= `room`; the arrays are valid until the next call."""
         count = len(qpos)
         self.qpos[:count] = qpos
         self._qvel[:count] = qvel
@@ -204,14 +221,14 @@ class Engine:
         self.shelf = shelf or Shelf()
         self._idle = self.shelf.evaluators
         self._lean = lean(model)
-        self._pool: tuple[int, ThreadPoolExecutor] | None = None
+        self._pool: tuple[tuple[int, int], ThreadPoolExecutor] | None = None
 
-    @engine_warnings()
     def poses(self, qpos: FloatArray) -> Poses:
         """Evaluate positions of a few configurations ``(k, nq)``, k <= `BLOCK`; the result is a copy."""
-        evaluator = self._take()
+        evaluator = self._take(len(qpos))
         evaluator.qpos[: len(qpos)] = qpos
-        poses = evaluator.place(np.arange(len(qpos), dtype=np.int32))
+        with EvaluationWarnings():
+            poses = evaluator.place(np.arange(len(qpos), dtype=np.int32))
         copies = [array[: len(qpos)].copy() for array in poses.tables]
         self._idle.put(evaluator)
         for copied in copies:
@@ -223,14 +240,14 @@ class Engine:
         """Call *work* for each block of samples, over the engine's threads; it writes its own rows of shared arrays."""
 
         def one(first: int) -> None:
-            evaluator = self._take()
+            evaluator = self._take(min(size, samples, BLOCK))
             try:
                 work(evaluator, slice(first, min(first + size, samples)))
             finally:
                 self._idle.put(evaluator)
 
         starts = range(0, samples, size)
-        with engine_warnings():
+        with EvaluationWarnings():
             if self.threads == 1 or len(starts) == 1:
                 for first in starts:
                     one(first)
@@ -239,22 +256,31 @@ class Engine:
                 for done in [self._workers().submit(one, first) for first in starts]:
                     done.result()
 
-    def _take(self) -> Evaluator:
-        try:
-            found = self._idle.get_nowait()
-        except queue.Empty:
-            return Evaluator(self._lean, self._frames)
+    def _take(self, samples: int) -> Evaluator:
+        """An evaluator that has room for so many samples."""
+        room = SMALL if samples <= SMALL else BLOCK
+        while True:
+            try:
+                found = self._idle.get_nowait()
+            except queue.Empty:
+                return self._made(room)
+            if found.room >= room:  # a smaller one is made for a short batch, and given up for a long one
+                break
         if found.model is not self._lean:
             try:
                 found.take_up(self._lean, self._frames)
             except mujoco.FatalError:  # bodies that MuJoCo calls simple have a smaller mass matrix
-                return Evaluator(self._lean, self._frames)
+                return self._made(room)
         return found
+
+    def _made(self, room: int) -> Evaluator:
+        with self.shelf.data_of(self._lean) as shapes:
+            return Evaluator(self._lean, self._frames, room, shapes)
 
     def _workers(self) -> ThreadPoolExecutor:
         # a forked process has no threads, whatever its parent had
-        if self._pool is None or self._pool[0] != os.getpid():
-            self._pool = os.getpid(), ThreadPoolExecutor(self.threads, thread_name_prefix="workbench")
+        if self._pool is None or self._pool[0] != (os.getpid(), self.threads):
+            self._pool = (os.getpid(), self.threads), ThreadPoolExecutor(self.threads, thread_name_prefix="workbench")
         return self._pool[1]
 
 

@@ -16,7 +16,7 @@ from workbench.arrays import FloatArray
 from workbench.errors import ModelError, MotionError
 from workbench.reference.bench import bench
 from workbench.reference.body_forces import felt_gravity
-from workbench.reference.forward_kernels import DONE, OPEN, Masses, accelerations, move, room_for
+from workbench.reference.forward_kernels import DONE, OPEN, Masses, accelerations, hold, move, room_for
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.reference.sides import UNKNOWN
 
@@ -63,11 +63,12 @@ class Plant:
         self._mechanism = closer.mechanism
         self._rules = closer.rules()
         force = np.zeros(3) if external_force is None else reference.base_rotation @ np.asarray(external_force)
-        self._masses = masses_of(reference, force)
+        masses = masses_of(reference, force)
         self._bench, self._room = bench(self._mechanism), room_for(self._mechanism)
+        self._held = self._hold(masses)
         self._base_rotation, self._base_position = reference.base_rotation, reference.base_position
         self._force = np.zeros(3) if external_force is None else np.array(external_force, dtype=np.float64)
-        self._check()
+        self._check(masses)
 
     @property
     def q(self) -> FloatArray:
@@ -117,8 +118,7 @@ class Plant:
         bench, room = self._bench, self._room
         room.q[:], room.qd[:], room.carried_here[:] = q, qd, 0.0
         bench.here[:], bench.tangent_here[:], bench.sides[:] = qpos, 0.0, UNKNOWN
-        still = np.zeros(len(room.q))
-        if move(self._mechanism, self._rules, self._masses, bench, room, still, 0.0, 1, True) != DONE:
+        if move(self._held, np.zeros(len(room.q)), 0.0, 1, True) != DONE:
             raise MotionError(
                 "control: the loops cannot be closed where the motion begins", value=np.asarray(q).tolist()
             )
@@ -128,11 +128,9 @@ class Plant:
 
         Unless it is `DONE`, the state is that of the last step that was.
         """
-        if not math.isfinite(float(tau.sum())):
+        if not all(map(math.isfinite, tau.tolist())):
             raise ValueError("torques have to be finite")
-        return int(
-            move(self._mechanism, self._rules, self._masses, self._bench, self._room, tau, duration, steps, False)
-        )
+        return int(move(self._held, tau, duration, steps, False))
 
     def acceleration(self, tau: FloatArray) -> FloatArray:
         """Accelerations ``(na,)`` under torques, now."""
@@ -140,7 +138,10 @@ class Plant:
         accelerations(self._room, np.array(tau, dtype=np.float64), qdd)
         return qdd
 
-    def _check(self) -> None:
+    def _hold(self, masses: Masses) -> object:
+        return hold(self._mechanism, self._rules, masses, self._bench, self._room)
+
+    def _check(self, masses: Masses) -> None:
         """Hold M and h against the reference's inverse dynamics, at home and around it."""
         reference, na = self.reference, len(self._room.q)
         random = np.random.default_rng(2010)
@@ -150,12 +151,12 @@ class Plant:
         qd = 50.0 * reach * random.uniform(-1.0, 1.0, (PROBES, na))
         qdd = 1000.0 * reach * random.uniform(-1.0, 1.0, (PROBES, na))
         wanted = reference.inverse_dynamics(q, qd, qdd, "distributed", self._force).tau
-        whole, self._masses = self._masses, self._masses._replace(soft=1e-300)
+        self._held = self._hold(masses._replace(soft=1e-300))
         found = np.zeros_like(wanted)
         for sample in range(PROBES):
             self.begin(q[sample], qd[sample])
             found[sample] = self._room.mass @ qdd[sample] + self._room.bias
-        self._masses = whole
+        self._held = self._hold(masses)
         scale = np.maximum(np.abs(wanted).max(axis=0), AGREE)
         off = np.abs(found - wanted).max(axis=0) / scale
         joint = int(np.argmax(np.where(np.isnan(off), np.inf, off)))

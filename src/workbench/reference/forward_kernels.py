@@ -14,13 +14,17 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.compiled import compiled, merged
+from workbench.compiled import compiled, merged, types
 from workbench.reference.bench import Mechanism
 from workbench.reference.closing import _copy, _copy_rows, _on_side, close_one
 from workbench.reference.kernels import follow_tangent, integrate
 from workbench.reference.kinematics import FLOATING, TURNING, _turned
 from workbench.reference.linear import solve
 from workbench.reference.rows import acceleration_rows, point_motion
+from workbench.shielded import shielded
+
+with shielded():
+    from numba.experimental import structref
 
 DONE, OPEN, LOST = 0, 1, 2
 """How a stretch of time ended: at its end, where the loops cannot be closed on the branch, where numbers are lost."""
@@ -80,6 +84,8 @@ class Room(NamedTuple):
     v: FloatArray
     """``(nbody, 6)`` spatial velocities about each tree's fixed point"""
     a: FloatArray
+    more: FloatArray
+    """``(nbody, 6)`` what passive accelerations add to them"""
     per_rate: FloatArray
     """``(nbody, 6, na)`` spatial velocity per actuated velocity"""
     stages: FloatArray
@@ -92,13 +98,31 @@ class Room(NamedTuple):
     """``(6, na)``"""
 
 
+@structref.register
+class HeldType(types.StructRef):  # type: ignore[misc]
+    """To the compiler, a plant's arrays held together."""
+
+
+class Held(structref.StructRefProxy):  # type: ignore[misc]
+    """A plant's arrays, handed to machine code once: taking some hundred out of Python takes longer than a step."""
+
+
+structref.define_proxy(Held, HeldType, ["mechanism", "rules", "masses", "bench", "room"])
+
+
+@compiled
+def hold(mechanism, rules, masses, bench, room):  # type: ignore[no-untyped-def]
+    """Hold a plant's arrays together, for `move`; they stay the same arrays."""
+    return Held(mechanism, rules, masses, bench, room)
+
+
 def room_for(mechanism: Mechanism) -> Room:
     """Room for one mechanism."""
     na, nv, nb = len(mechanism.actuated), len(mechanism.weights), len(mechanism.kinematics.parent)
     m, p = int(mechanism.closures.block_rows[-1]), len(mechanism.passive)
     return Room(
         np.zeros(na), np.zeros(na), np.zeros(na), np.zeros((na, na)), np.zeros(na), np.zeros(nv), np.zeros(nv),
-        np.zeros(nv), np.zeros(p), np.zeros(m), np.zeros((nb, 6)), np.zeros((nb, 6)),
+        np.zeros(nv), np.zeros(p), np.zeros(m), np.zeros((nb, 6)), np.zeros((nb, 6)), np.zeros((nb, 6)),
         np.zeros((nb, 6, na)), np.zeros((5, na)), np.zeros(3), np.zeros((na, na)), np.zeros((6, na)),
     )  # fmt: skip
 
@@ -144,12 +168,28 @@ def _motions(kin, cdof, qvel, qacc, tangent, v, a, per_rate):  # type: ignore[no
                         per_rate[b, i, k] += cdof[e, i] * tangent[e, k]
 
 
+@merged
+def _add_accelerations(kin, cdof, qacc, more, a):  # type: ignore[no-untyped-def]
+    """Add to the bodies' accelerations what *qacc* ``(nv,)`` brings: they are linear in it."""
+    for b in range(1, kin.parent.shape[0]):
+        for i in range(6):
+            more[b, i] = more[kin.parent[b], i]
+        for j in range(kin.first[b], kin.first[b] + kin.number[b]):
+            first = kin.dof_of[j]
+            count = 6 if kin.kind[j] == FLOATING else (3 if kin.kind[j] == TURNING else 1)
+            for e in range(first, first + count):
+                for i in range(6):
+                    more[b, i] += cdof[e, i] * qacc[e]
+        for i in range(6):
+            a[b, i] += more[b, i]
+
+
 @compiled
 def _forces(kin, masses, xpos, xquat, v, a, per_rate, lines, mass, bias):  # type: ignore[no-untyped-def]
     """Add all bodies' inertia to ``mass (na, na)`` and ``bias (na,)``; ``lines (6, na)`` is room."""
     na = bias.shape[0]
     turn = np.empty((3, 3))
-    inertia = np.empty((3, 3))
+    inertia, half = np.empty((3, 3)), np.empty((3, 3))
     point = np.empty(3)
     for b in range(1, masses.mass.shape[0]):
         x, y, z = _turned(xquat[b], masses.centre[b])
@@ -161,11 +201,12 @@ def _forces(kin, masses, xpos, xquat, v, a, per_rate, lines, mass, bias):  # typ
         turn[2, 0], turn[2, 1], turn[2, 2] = 2 * (qx * qz - w * qy), 2 * (qy * qz + w * qx), 1 - 2 * (qx * qx + qy * qy)
         for i in range(3):
             for j in range(3):
-                value = 0.0
+                half[i, j] = 0.0
                 for k in range(3):
-                    for n in range(3):
-                        value += turn[i, k] * masses.inertia[b, k, n] * turn[j, n]
-                inertia[i, j] = value
+                    half[i, j] += turn[i, k] * masses.inertia[b, k, j]
+        for i in range(3):
+            for j in range(3):
+                inertia[i, j] = half[i, 0] * turn[j, 0] + half[i, 1] * turn[j, 1] + half[i, 2] * turn[j, 2]
         for k in range(na):
             s0, s1, s2 = per_rate[b, 0, k], per_rate[b, 1, k], per_rate[b, 2, k]
             lines[0, k], lines[1, k], lines[2, k] = s0, s1, s2
@@ -185,12 +226,13 @@ def _forces(kin, masses, xpos, xquat, v, a, per_rate, lines, mass, bias):  # typ
         for k in range(na):
             bias[k] += lines[0, k] * n0 + lines[1, k] * n1 + lines[2, k] * n2
             bias[k] += lines[3, k] * fx + lines[4, k] * fy + lines[5, k] * fz
+            h0 = inertia[0, 0] * lines[0, k] + inertia[0, 1] * lines[1, k] + inertia[0, 2] * lines[2, k]
+            h1 = inertia[1, 0] * lines[0, k] + inertia[1, 1] * lines[1, k] + inertia[1, 2] * lines[2, k]
+            h2 = inertia[2, 0] * lines[0, k] + inertia[2, 1] * lines[1, k] + inertia[2, 2] * lines[2, k]
+            l0, l1, l2 = m * lines[3, k], m * lines[4, k], m * lines[5, k]
             for j in range(k + 1):
-                value = 0.0
-                for i in range(3):
-                    turned = inertia[i, 0] * lines[0, j] + inertia[i, 1] * lines[1, j] + inertia[i, 2] * lines[2, j]
-                    value += m * lines[3 + i, k] * lines[3 + i, j] + lines[i, k] * turned
-                mass[k, j] += value
+                mass[k, j] += l0 * lines[3, j] + l1 * lines[4, j] + l2 * lines[5, j]
+                mass[k, j] += h0 * lines[0, j] + h1 * lines[1, j] + h2 * lines[2, j]
 
 
 @compiled
@@ -212,7 +254,7 @@ def _evaluate(mechanism, masses, w, r, qpos, tangent, velocity):  # type: ignore
         solve(w.a, w.beta, w.order, np.int64(w.facts[1]), r.rates, r.x)
         for j in range(passive.shape[0]):
             r.carried[passive[j]] = r.x[j]
-        _motions(kin, w.places.cdof, r.qvel, r.carried, tangent, r.v, r.a, r.per_rate)
+        _add_accelerations(kin, w.places.cdof, r.carried, r.more, r.a)
     for k in range(na):
         r.bias[k] = 0.0
         for j in range(na):
@@ -313,13 +355,14 @@ def _stage(r, stage, h):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def move(mechanism, rules, masses, w, r, tau, duration, steps, stand):  # type: ignore[no-untyped-def]
+def move(held, tau, duration, steps, stand):  # type: ignore[no-untyped-def]
     """Move on by *duration* under constant torques ``(na,)``, in equal steps of Nystrom's classical method, order four.
 
     The second and third stage share their coordinates, so a step closes the loops three times. With *stand* time does
     not move on: the state that the room and ``Bench.here`` hold is closed and evaluated. One kernel for both, and each
     call in it once, since handing so many arrays over takes seconds to compile.
     """
+    mechanism, rules, masses, w, r = held.mechanism, held.rules, held.masses, held.bench, held.room
     na, h = tau.shape[0], 0.0 if stand else duration / steps
     q, v = r.stages[3], r.stages[4]
     for _ in range(steps):

@@ -11,9 +11,6 @@ from workbench.errors import ModelError
 from workbench.reference.structure import Structure
 from workbench.reference.tolerance import KEY, Tolerance
 
-RANK_TOLERANCE = 1e-9
-"""A singular value of the passive loop Jacobian below this fraction of the largest one counts as zero."""
-
 NEARBY = 1e-2
 """rad or m: how far a pose is moved to see whether a freedom is loose there too."""
 
@@ -27,9 +24,7 @@ Reclose = Callable[[FloatArray], FloatArray]
 """A velocity ``(nv,)`` to move the home pose by -> constraint Jacobian ``(m, nv)`` of the closed pose nearest to it."""
 
 
-def check_freedoms(
-    structure: Structure, jacobian: FloatArray, reclose: Reclose, tolerance: float = RANK_TOLERANCE
-) -> None:
+def check_freedoms(structure: Structure, jacobian: FloatArray, reclose: Reclose, tolerance: float) -> None:
     """Refuse a mechanism that has freedoms which no actuator holds.
 
     Parameters
@@ -41,7 +36,7 @@ def check_freedoms(
     reclose
         The same for a closed pose nearby.
     tolerance
-        The fraction of the largest singular value below which one counts as zero.
+        The fraction of the largest singular value below which one counts as zero, `Tolerance.relative`.
 
     Raises
     ------

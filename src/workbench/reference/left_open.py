@@ -13,7 +13,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.errors import ModelError
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.engine_warnings import engine_warnings
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.reference.result import ReferenceResult
 from workbench.reference.rods import RodFrame

@@ -123,6 +123,19 @@ class MujocoReference(PlatformSide):
         """All velocities per actuated one, ``(n, nv, na)``; samples closed as `inverse_dynamics` does."""
         return self._assemble(q, ordered, near).tangent
 
+    @property
+    def threads(self) -> int:
+        """Threads that samples are evaluated over; no bit of a result depends on it."""
+        return self._threads
+
+    @threads.setter
+    def threads(self, threads: int) -> None:
+        self._threads = threads
+        for engine in self._engines.values():
+            engine.threads = threads
+        if self._leader:
+            self._leader[0].threads = threads
+
     def spec(self) -> mujoco.MjSpec:
         """A fresh specification of the model, to be changed and compiled."""
         return self.loaded.spec()

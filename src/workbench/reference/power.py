@@ -140,7 +140,7 @@ def power_balance(
     storage, doubt, steps = _energy_rate(reference, result.qpos[kept], q[kept], qd[kept], qdd[kept], mass_model)
     qvel = result.qvel[kept]
     terms = terms_of(reference.compiled(mass_model), result.qpos[kept], qvel, result.qacc[kept])
-    dissipation = losses(reference, mass_model, qvel, terms)
+    dissipation = losses(reference, mass_model, result.qpos[kept], qvel)
     external = np.sum(force[kept] * result.xd[kept], axis=1)
     residual = power[kept] + external - storage - dissipation
     size = np.abs(residual)

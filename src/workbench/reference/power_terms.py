@@ -15,8 +15,6 @@ from workbench.reference.body_forces import felt_gravity
 class Terms:
     """Of m samples, each ``(m,)``."""
 
-    further_losses: FloatArray
-    """W: what passive forces other than springs and linear damping of joints take"""
     energy: FloatArray
     """J: the sizes of all summands of the energy, added up"""
     power: FloatArray
@@ -35,11 +33,8 @@ def terms_of(model: mujoco.MjModel, qpos: FloatArray, qvel: FloatArray, qacc: Fl
     """
     data = mujoco.MjData(model)
     pulls = np.asarray(model.body_mass)[:, None] * felt_gravity(model)
-    damping = np.asarray(model.dof_damping)
-    # what the plain formula counts is not counted twice, to the last bit
-    plain = not _more_than_joints_damp(model)
-    losses, energy, power = np.zeros((3, len(qpos)))
-    mass = np.zeros((model.nv, model.nv))
+    energy, power = np.zeros((2, len(qpos)))
+    lengths, mass = _lengths(model, qpos), np.zeros((model.nv, model.nv))
     for sample in range(len(qpos)):
         data.qpos[:], data.qvel[:] = qpos[sample], qvel[sample]
         mujoco.mj_fwdPosition(model, data)
@@ -48,20 +43,33 @@ def terms_of(model: mujoco.MjModel, qpos: FloatArray, qvel: FloatArray, qacc: Fl
         mujoco.mj_fullM(model, data, mass)
         size = np.abs(mass)
         energy[sample] = np.sum(np.abs(pulls * data.xipos)) + 0.5 * v @ size @ v
-        energy[sample] += np.abs(data.qfrc_spring) @ np.abs(_lengths(model, qpos[sample]))
+        energy[sample] += np.abs(data.qfrc_spring) @ lengths[sample]
         power[sample] = v @ (size @ np.abs(qacc[sample]) + np.abs(data.qfrc_bias) + np.abs(data.qfrc_passive))
-        if not plain:
-            other = data.qfrc_passive - data.qfrc_spring + damping * qvel[sample]
-            losses[sample] = -float(other @ qvel[sample])
-    return Terms(losses, energy, power)
+    return Terms(energy, power)
+
+
+def further_losses(model: mujoco.MjModel, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
+    """What passive forces other than springs and linear damping of joints take, ``(m,)`` in watts."""
+    losses = np.zeros(len(qpos))
+    # what the plain formula counts is not counted twice, to the last bit
+    if not _more_than_joints_damp(model):
+        return losses
+    data, damping = mujoco.MjData(model), np.asarray(model.dof_damping)
+    for sample in range(len(qpos)):
+        data.qpos[:], data.qvel[:] = qpos[sample], qvel[sample]
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        other = data.qfrc_passive - data.qfrc_spring + damping * qvel[sample]
+        losses[sample] = -float(other @ qvel[sample])
+    return losses
 
 
 def _lengths(model: mujoco.MjModel, qpos: FloatArray) -> FloatArray:
-    """A coordinate's size for each velocity ``(nv,)``; 1 for turns of ball and free joints."""
-    sizes = np.ones(model.nv)
+    """A coordinate's size for each velocity ``(m, nv)``; 1 for turns of ball and free joints."""
+    sizes = np.ones((len(qpos), model.nv))
     for joint in range(model.njnt):
         if mujoco.mjtJoint(model.jnt_type[joint]) in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-            sizes[model.jnt_dofadr[joint]] = qpos[model.jnt_qposadr[joint]]
+            sizes[:, model.jnt_dofadr[joint]] = np.abs(qpos[:, model.jnt_qposadr[joint]])
     return sizes
 
 

@@ -24,7 +24,7 @@ from mujoco.batch import Batch
 
 from workbench.arrays import FloatArray
 from workbench.errors import ArrayError, MotionError
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.engine_warnings import engine_warnings
 from workbench.reference.mujoco_reference import MujocoReference
 
 COARSE_STEPS = 1000
@@ -256,7 +256,7 @@ class _Runner:
         lost = ~np.isfinite(applied).all(axis=(1, 2))
         applied[lost] = 0.0
         count = len(applied)
-        batch = Batch(model, count, 1)
+        batch = Batch(model, count, min(count, self._reference.threads))
         batch.qpos = np.repeat(self._initial.qpos, count, axis=0)
         batch.qvel = np.repeat(self._initial.qvel, count, axis=0)
         with quiet():

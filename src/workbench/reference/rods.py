@@ -7,6 +7,7 @@ three hinges through one point, a connect.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import mujoco
@@ -26,6 +27,15 @@ in a file stay below it."""
 LOPSIDED = 0.02
 """As `ROUND`: up to here a rod counts as made for a body of revolution, with the digits of a CAD file and a hole or a
 flat; what the difference is worth in torque is computed. Beyond, it is another body."""
+
+BALL, HINGE, FREE = (
+    kind.value for kind in (mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_FREE)
+)
+
+CLEARLY = 0.1
+"""Of `ROUND`: a rod that is rounder than this needs no closer look."""
+
+IDENTITY = np.eye(3)
 
 COPLANAR = 1e-6
 """Determinant of three hinge axes below which they make no spherical joint."""
@@ -63,37 +73,40 @@ class Unevenness:
 
 def idle_rods(model: mujoco.MjModel, blocks: list[Block]) -> list[Rod]:
     """All groups of bodies that two spherical joints hold and nothing else."""
-    first = _groups(model)
+    parents, joints = model.body_parentid.tolist(), model.body_jntnum.tolist()
+    first = _groups(parents, joints)
     rods = []
     for body in range(1, model.nbody):
-        if first[body] != body or not model.body_jntnum[body]:
+        if first[body] != body or not joints[body]:
             continue
-        group = tuple(int(b) for b in np.flatnonzero(first == body))
-        points = _held_by(model, blocks, group, body)
+        group = tuple(other for other, leader in enumerate(first) if leader == body)
+        points = _held_by(model, blocks, group, body, parents)
         if points is not None and len(points) == 2:
             rods.append(Rod(body, group, points[0], points[1]))
     return rods
 
 
-def _groups(model: mujoco.MjModel) -> np.ndarray:
-    """The first body of the group that each body is welded into by the tree, ``(nbody,)``."""
-    first = np.arange(model.nbody)
-    for body in range(1, model.nbody):
-        if not model.body_jntnum[body]:
-            first[body] = first[model.body_parentid[body]]
+def _groups(parents: list[int], joints: list[int]) -> list[int]:
+    """The first body of the group that each body is welded into by the tree."""
+    first = list(range(len(parents)))
+    for body in range(1, len(parents)):
+        if not joints[body]:
+            first[body] = first[parents[body]]
     return first
 
 
-def _held_by(model: mujoco.MjModel, blocks: list[Block], group: tuple[int, ...], body: int) -> list[int] | None:
+def _held_by(
+    model: mujoco.MjModel, blocks: list[Block], group: tuple[int, ...], body: int, parents: list[int]
+) -> list[int] | None:
     """Centres of the spherical joints that hold a group; None where something else holds it as well."""
     points = []
     own = _spherical(model, body)
     if own is not None:
         points.append(own)
-    elif mujoco.mjtJoint(model.jnt_type[model.body_jntadr[body]]) != mujoco.mjtJoint.mjJNT_FREE:
+    elif model.jnt_type[model.body_jntadr[body]] != FREE:
         return None
     for child in range(1, model.nbody):
-        if child not in group and model.body_parentid[child] in group:
+        if child not in group and parents[child] in group:
             centre = _spherical(model, child)
             if centre is None:
                 return None
@@ -112,10 +125,10 @@ def _held_by(model: mujoco.MjModel, blocks: list[Block], group: tuple[int, ...],
 def _spherical(model: mujoco.MjModel, body: int) -> int | None:
     """The centre of the spherical joint between a body and its parent; None where there is another joint."""
     start, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-    kinds = [mujoco.mjtJoint(kind) for kind in model.jnt_type[start : start + count]]
-    if kinds == [mujoco.mjtJoint.mjJNT_BALL]:
+    kinds = model.jnt_type[start : start + count].tolist()
+    if kinds == [BALL]:
         return -1 - start
-    if kinds == [mujoco.mjtJoint.mjJNT_HINGE] * 3:
+    if kinds == [HINGE] * 3:
         joints = slice(start, start + 3)
         together = np.ptp(np.array(model.jnt_pos[joints]), axis=0).max() == 0.0
         if together and abs(np.linalg.det(np.array(model.jnt_axis[joints]))) > COPLANAR:
@@ -155,6 +168,26 @@ class RodFrame:
         seen = turn @ inertia @ turn.T
         uneven = max(abs(seen[0, 1]), abs(seen[0, 2]), abs(seen[1, 2]), abs(seen[1, 1] - seen[2, 2]))
         return Unevenness(self.length, self._off(centre), float(uneven), float(np.trace(inertia)))
+
+    def plainly_round(self) -> bool:
+        """Whether the rod is one body and a body of revolution, well within `ROUND`: most are, and variants are asked.
+
+        Its own inertia is held against the round one that is nearest to it; what they differ by is at least half of
+        `Unevenness.uneven`.
+        """
+        if len(self.group) > 1 or not self.length:
+            return False
+        body = self.group[0]
+        axis = (self.far - self.near) / self.length
+        x, y, z = axis.tolist()
+        a, b, c = (self._model.body_ipos[body] - self.near).tolist()
+        off = math.hypot(y * c - z * b, z * a - x * c, x * b - y * a)
+        inertia = inertia_matrix(self._model, body)
+        trace, along = float(inertia[0, 0] + inertia[1, 1] + inertia[2, 2]), float(axis @ inertia @ axis)
+        across = 0.5 * (trace - along)
+        rest = inertia - (along - across) * np.multiply.outer(axis, axis)
+        gap = math.hypot(*(rest - across * IDENTITY).ravel().tolist())
+        return off <= CLEARLY * ROUND * self.length and gap <= CLEARLY * ROUND * trace
 
     def rounded(self) -> tuple[FloatArray, FloatArray]:
         """Mass centre ``(3,)`` and inertia ``(3, 3)`` about it that make the rod round.

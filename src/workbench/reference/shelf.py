@@ -40,7 +40,10 @@ class Shelf:
         except queue.Empty:
             data = mujoco.MjData(model)
         else:
-            mujoco.mj_resetData(model, data)
+            if len(data.M) == model.nC:
+                mujoco.mj_resetData(model, data)
+            else:  # bodies that MuJoCo calls simple have a smaller mass matrix
+                data = mujoco.MjData(model)
         yield data
         self.data.put(data)
 

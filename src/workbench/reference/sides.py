@@ -147,12 +147,12 @@ def side_table(jacobian: FloatArray, pattern: np.ndarray, group: IntArray, colum
     columns
         ``(p,)`` velocity addresses.
     """
-    from scipy.linalg import qr
+    from scipy.linalg.lapack import dgeqp3
 
     m, p = jacobian.shape
     if m < p or not p or np.linalg.matrix_rank(jacobian) < p:
         return NO_SIDES
-    chosen = np.arange(m) if m == p else np.sort(qr(jacobian.T, mode="r", pivoting=True)[1][:p])
+    chosen = np.arange(m) if m == p else np.sort(dgeqp3(jacobian.T)[1][:p] - 1)
     blocks = _blocks(pattern.tobytes(), pattern.shape[1], tuple(group.tolist()), tuple(chosen.tolist()))
     if not blocks:
         return NO_SIDES

@@ -5,6 +5,7 @@ Names are resolved here, once; whatever the projection does not cover is refused
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import mujoco
@@ -17,7 +18,7 @@ from workbench.limits import MOST_FREEDOMS
 from workbench.mjcf.compile import custom_text
 from workbench.mjcf.lines import with_lines
 from workbench.mjcf.refusal import Refusal, joined
-from workbench.reference.closures import Block, Closures, fixed_tendons, name_of, read_closures
+from workbench.reference.closures import Closures, fixed_tendons, name_of, read_closures
 from workbench.reference.frames import Frames
 from workbench.reference.kinds import CONNECT, JOINT, ROWS, SPIN, TENDON, WELD
 from workbench.reference.rods import ROUND, Rod, RodFrame, idle_rods, refuse_rod, spin_block
@@ -95,6 +96,8 @@ class Structure:
     """what a reader of the results should know of the model, one line each"""
     lopsided: tuple[Rod, ...] = ()
     """rods that are no bodies of revolution, to six digits"""
+    joints_at: bytes = b""
+    """anchors and axes of all joints: with the tree, what rods there are follows from them"""
 
     @property
     def rows(self) -> int:
@@ -123,7 +126,7 @@ class _Found:
     refusals: list[Refusal]
 
 
-def _read(model: mujoco.MjModel) -> _Found:
+def _read(model: mujoco.MjModel, known: Structure | None = None) -> _Found:
     closures = read_closures(model)
     found = uncovered(model, closures)
     if not model.nu:
@@ -138,7 +141,7 @@ def _read(model: mujoco.MjModel) -> _Found:
         )
     base, missing = _named(model, mujoco.mjtObj.mjOBJ_BODY, "base_body", "body")
     site, lost = _named(model, mujoco.mjtObj.mjOBJ_SITE, "platform_site", "site")
-    judged = _judged(model, closures, site)
+    judged = _judged(model, closures, site, _rods(model, closures, known))
     return _Found(closures, base, site, judged, found + missing + lost + [r for _, r, _ in judged if r is not None])
 
 
@@ -168,7 +171,7 @@ def read_structure(model: mujoco.MjModel, file: str, known: Structure | None = N
         all of it; ``error.facts["refusals"]`` holds one `Refusal` each.
     """
     refuse_large(model, file)
-    found = _read(model)
+    found = _read(model, known)
     if found.refusals:
         raise joined(file, found.refusals)
     if known is not None and _made_alike(known, found):
@@ -214,7 +217,21 @@ def read_structure(model: mujoco.MjModel, file: str, known: Structure | None = N
         rods=rods,
         notes=tuple(note for _, _, note in judged if note),
         lopsided=tuple(rod for rod, _, note in judged if note),
+        joints_at=_joints_at(model),
     )
+
+
+def _joints_at(model: mujoco.MjModel) -> bytes:
+    return bytes(model.jnt_pos.tobytes() + model.jnt_axis.tobytes())
+
+
+def _rods(model: mujoco.MjModel, closures: Closures, known: Structure | None) -> Sequence[Rod]:
+    """The model's idle rods: the known ones where the same joints stand in the same places."""
+    if known is not None and known.joints_at == _joints_at(model):
+        loops = len(known.blocks) - len(known.rods)
+        if known.blocks[:loops].tolist() == [list(block) for block in closures.blocks]:
+            return known.rods
+    return idle_rods(model, closures.blocks)
 
 
 def _drawn(model: mujoco.MjModel) -> FloatArray:
@@ -242,6 +259,7 @@ def _with_numbers(known: Structure, model: mujoco.MjModel, found: _Found) -> Str
         friction=_friction(model, known.actuated, tendons),
         notes=tuple(note for _, _, note in found.judged if note),
         lopsided=tuple(rod for rod, _, note in found.judged if note),
+        joints_at=_joints_at(model),
     )
 
 
@@ -295,16 +313,21 @@ def _friction(model: mujoco.MjModel, actuated: IntArray, tendons: FloatArray) ->
     return Friction(dry[actuated], passive, rubbing[kept], rows)
 
 
-def _judged(model: mujoco.MjModel, closures: Closures, site: int) -> list[tuple[Rod, Refusal | None, str]]:
+def _judged(
+    model: mujoco.MjModel, closures: Closures, site: int, rods: Sequence[Rod]
+) -> list[tuple[Rod, Refusal | None, str]]:
     """Idle rods, each with what stands against it and what is to be said of it."""
-    blocks: list[Block] = closures.blocks
-    rods = idle_rods(model, blocks)
     if not rods:
         return []
     frames = Frames.of(closures.frames)
-    found = []
+    platform = int(model.site_bodyid[site]) if site >= 0 else -1
+    wet = bool(model.opt.density or model.opt.viscosity)
+    found: list[tuple[Rod, Refusal | None, str]] = []
     for rod in rods:
         shape = RodFrame(model, rod, frames)
+        if platform not in rod.group and not wet and shape.plainly_round():
+            found.append((rod, None, ""))
+            continue
         uneven = shape.unevenness()
         name = name_of(model, mujoco.mjtObj.mjOBJ_BODY, rod.body)
         refusal = refuse_rod(model, rod, uneven) or _off_axis(model, rod, shape, site) or _in_fluid(model, name)

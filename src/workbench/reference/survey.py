@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.mjcf.compile import engine_warnings
+from workbench.mjcf.engine_warnings import engine_warnings
 from workbench.mjcf.free_joints import floating_bases, held_roots
 
 STEPS = 100

@@ -16,6 +16,9 @@ from workbench.reference.closures import Closures, is_fixed, name_of
 from workbench.reference.kinds import CONNECT, WELD
 
 SCALARS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+SCALAR_KINDS = [kind.value for kind in SCALARS]
+JOINTS = mujoco.mjtTrn.mjTRN_JOINT.value
+FREE = mujoco.mjtJoint.mjJNT_FREE.value
 
 
 def switched_off(model: mujoco.MjModel, flag: str) -> bool:
@@ -145,6 +148,9 @@ def _tendons(model: mujoco.MjModel) -> Iterator[Refusal]:
 
 
 def _actuators(model: mujoco.MjModel) -> Iterator[Refusal]:
+    kinds = model.jnt_type[model.actuator_trnid[:, 0]] if (model.actuator_trntype == JOINTS).all() else None
+    if kinds is not None and np.isin(kinds, SCALAR_KINDS).all():
+        return
     obj = mujoco.mjtObj
     for actuator in range(model.nu):
         name = name_of(model, obj.mjOBJ_ACTUATOR, actuator)
@@ -168,12 +174,10 @@ def _actuators(model: mujoco.MjModel) -> Iterator[Refusal]:
 
 def _floating(model: mujoco.MjModel, closures: Closures) -> Iterator[Refusal]:
     """Free joints whose tree no loop ties to the world: every freedom of such a base is loose."""
+    if not (model.jnt_type == FREE).any():
+        return
     root = np.array(model.body_rootid)
-    free = {
-        int(root[model.jnt_bodyid[j]]): j
-        for j in range(model.njnt)
-        if mujoco.mjtJoint(model.jnt_type[j]) == mujoco.mjtJoint.mjJNT_FREE
-    }
+    free = {int(root[model.jnt_bodyid[j]]): j for j in np.flatnonzero(model.jnt_type == FREE).tolist()}
     # trees that loops tie together, the world and all trees without a free joint being one
     held = {int(body): (0 if int(body) not in free else int(body)) for body in np.unique(root)}
     for kind, one, two, _, _ in closures.blocks:

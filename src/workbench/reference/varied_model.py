@@ -127,7 +127,7 @@ def varied_reference(
 
 
 def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    from workbench.mjcf.compile import engine_warnings
+    from workbench.mjcf.engine_warnings import engine_warnings
 
     try:
         with engine_warnings():

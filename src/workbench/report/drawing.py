@@ -9,13 +9,13 @@ from __future__ import annotations
 import contextlib
 import gc
 import multiprocessing
-import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection
 from typing import Any
 
+from workbench.processes import cores
 from workbench.report.plot import Plot
 
 WORTH_IT = 12
@@ -49,7 +49,7 @@ def draw(plots: Sequence[Plot], show: Show | None = None, *, second: bool = Fals
 
 def can_fork() -> bool:
     """Whether a copy of this process can be made that shares its data: on Linux, with a second core."""
-    return sys.platform == "linux" and hasattr(os, "sched_getaffinity") and len(os.sched_getaffinity(0)) > 1
+    return sys.platform == "linux" and cores() > 1
 
 
 def _take(sent: Connection | None, plots: Sequence[Plot], drawn: set[int]) -> None:

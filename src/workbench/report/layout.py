@@ -11,6 +11,7 @@ from matplotlib.figure import FigureBase, SubFigure
 from matplotlib.ticker import FixedLocator, FuncFormatter
 from matplotlib.transforms import Transform, blended_transform_factory
 
+from workbench.report.light_axis import LightAxes
 from workbench.report.style import INK
 from workbench.report.svg import OVER_TIME, OWN
 
@@ -44,7 +45,8 @@ def stack(figure: FigureBase, heights: Sequence[float], header: int = 0, over: s
     panels: list[Axes] = []
     for share in heights:
         panel = room * share / sum(heights)
-        axes = figure.add_axes((left, top - panel, right - left, panel), sharex=panels[0] if panels else None)
+        above = panels[0] if panels else None
+        axes = figure.add_axes((left, top - panel, right - left, panel), sharex=above, axes_class=LightAxes)
         axes.locator_params(nbins=5)
         axes.margins(x=0.01)
         if over == "time [s]":
@@ -57,7 +59,7 @@ def stack(figure: FigureBase, heights: Sequence[float], header: int = 0, over: s
     # Fixed places: to find them from the tick labels takes a third of the drawing time.
     for axes in panels:
         axes.yaxis.set_label_coords(0.19 / width, 0.5, transform=_beside(figure, axes))
-    panels[-1].xaxis.set_label_coords(0.5, 0.19 / height, transform=_below(figure, panels[-1]))
+    place_below(figure, panels[-1])
     return panels
 
 
@@ -69,8 +71,10 @@ def _beside(figure: FigureBase, axes: Axes) -> Transform:
     return blended_transform_factory(_whole(figure), axes.transAxes)
 
 
-def _below(figure: FigureBase, axes: Axes) -> Transform:
-    return blended_transform_factory(axes.transAxes, _whole(figure))
+def place_below(figure: FigureBase, axes: Axes) -> None:
+    """Give the label of the x axis a fixed place near the figure's lower edge."""
+    beside = blended_transform_factory(axes.transAxes, _whole(figure))
+    axes.xaxis.set_label_coords(0.5, 0.19 / size_of(figure)[1], transform=beside)
 
 
 def size_of(figure: FigureBase) -> tuple[float, float]:

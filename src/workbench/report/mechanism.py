@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 
 from workbench.arrays import FloatArray
-from workbench.report.layout import size_of
+from workbench.report.layout import place_below, size_of
+from workbench.report.light_axis import LightAxes
 from workbench.report.load import Run, Series
 from workbench.report.manifest import DrawingRecord
 from workbench.report.plot import Plot
@@ -253,13 +254,14 @@ def _panel(
     limits: tuple[float, float, float, float],
     triad: tuple[str, ...],
 ) -> Axes:
-    axes = figure.add_axes(box)
+    axes = figure.add_axes(box, axes_class=LightAxes)
     axes.set_xlim(limits[0], limits[1])
     axes.set_ylim(limits[2], limits[3])
     axes.set_box_aspect(box[3] * size_of(figure)[1] / (box[2] * size_of(figure)[0]))
     if not triad:
         axes.locator_params(nbins=5)
         axes.set_xlabel(view.title)
+        place_below(figure, axes)
         if size_of(figure)[0] < NARROW and box[2] < 0.5:  # beside the axis it would run into the neighbour
             axes.annotate(view.side, (0.03, 0.98), xycoords="axes fraction", va="top")
         else:

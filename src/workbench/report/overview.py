@@ -16,6 +16,7 @@ from workbench.campaign.verdict import EXPECTED_FAILURE, RECORDED, WITHOUT_BOUND
 from workbench.report.case_section import joint_heading
 from workbench.report.curves import LONGEST_NAME, MARKERS
 from workbench.report.layout import SMALLEST_DRAWN, figure_legend, legend_rows, size_of
+from workbench.report.light_axis import LightAxes
 from workbench.report.load import ErrorRow, Run
 from workbench.report.plot import Plot
 from workbench.report.style import ALARM, BACKGROUND, GRID, PALETTE
@@ -91,10 +92,8 @@ def _panels(figure: FigureBase, cases: Sequence[str], number: int) -> list[Axes]
     left = 0.2 + LETTER * max(len(_name(case)) for case in cases)
     bottom, top, gap = 0.44 / height, 1 - (height - 0.5 - ROW * len(cases)) / height, 0.55
     room = (width - left - 0.3 - gap * (number - 1)) / number
-    return [
-        figure.add_axes(((left + turn * (room + gap)) / width, bottom, room / width, top - bottom))
-        for turn in range(number)
-    ]
+    boxes = [((left + turn * (room + gap)) / width, bottom, room / width, top - bottom) for turn in range(number)]
+    return [figure.add_axes(box, axes_class=LightAxes) for box in boxes]
 
 
 def _name(case: str) -> str:

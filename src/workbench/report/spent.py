@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import FigureBase
+from matplotlib.patches import Polygon
 
 from workbench.arrays import FloatArray
 from workbench.report.layout import TALL, figure_legend, legend_rows, stack
@@ -49,10 +50,13 @@ def spent_plot(run: Run, case: str, key: str, series: Series) -> Plot | None:
                     low, high = seen[index], seen[index + 1]
                     if not np.any(side[index] != side[index + 1]):
                         low = high = np.array([0, len(time) - 1])  # nothing to see but its name in the legend
-                    axes.fill(
-                        time[[*low, *high[::-1]]], [*side[index, low], *side[index + 1, high[::-1]]],
-                        color=PALETTE[index % 6], alpha=0.75, linewidth=0, label=part if side is edges[0] else None,
-                    )  # fmt: skip
+                    outline = np.column_stack(
+                        [time[[*low, *high[::-1]]], [*side[index, low], *side[index + 1, high[::-1]]]]
+                    )
+                    area = Polygon(outline, color=PALETTE[index % 6], alpha=0.75, linewidth=0)
+                    area.set_label(part if side is edges[0] else None)
+                    axes.add_artist(area)
+                    axes.update_datalim(outline)  # `Axes.fill` looks for the extent of each edge as if it were a curve
             axes.plot(time, tau.sum(axis=0), color="black", linewidth=0.8)
             axes.set_ylabel(torque_label(joint, unit))
         figure_legend(figure, panels[0], columns=3)

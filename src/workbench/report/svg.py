@@ -10,13 +10,16 @@ import io
 import json
 import re
 import warnings
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.backends.backend_svg import FigureCanvasSVG, RendererSVG
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
+from matplotlib.textpath import text_to_path
 
 from workbench.report.light_axis import lighten
 from workbench.report.shrink import Shapes, merge_lines, relative_path
@@ -66,13 +69,39 @@ def svg_of(figure: Figure, key: str) -> str:
     buffer = io.StringIO()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a name in another script: the reader's font has it
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+        _write(figure, buffer)
     svg = compact(buffer.getvalue(), key)
     if panels:
         told = escape_xml(json.dumps(panels, ensure_ascii=False, separators=(",", ":")))
         told = told.replace("&quot;", '"').replace("'", "&#39;")  # in single quotes: many fewer bytes
         svg = svg.replace("<svg ", f"<svg data-panels='{told}' ", 1)
     return svg
+
+
+def _write(figure: Figure, buffer: io.StringIO) -> None:
+    """As ``savefig`` does, with a renderer that remembers how long words are."""
+    dpi, (width, height) = figure.dpi, POINTS_PER_INCH * figure.get_size_inches()
+    figure.dpi = POINTS_PER_INCH
+    renderer: Any = _renderer(width, height, buffer, image_dpi=dpi, metadata={"Date": None, "Creator": None})
+    figure.draw(renderer)
+    renderer.finalize()
+
+
+class _Renderer(RendererSVG):
+    """Measures each word once for all figures: matplotlib does for each figure anew."""
+
+    def get_text_width_height_descent(self, s: str, prop: FontProperties, ismath: Any) -> tuple[float, float, float]:
+        return _measured(s, prop.copy(), ismath)  # a copy: it can be changed, and is a key
+
+
+_renderer: Any = _Renderer
+"""matplotlib says no types of it"""
+
+
+@lru_cache(10_000)
+def _measured(text: str, letters: FontProperties, is_math: Any) -> tuple[float, float, float]:
+    found: tuple[float, float, float] = text_to_path.get_text_width_height_descent(text, letters, is_math)
+    return found
 
 
 def _tag(figure: Figure) -> list[dict[str, Any]]:

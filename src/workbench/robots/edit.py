@@ -139,7 +139,7 @@ def edit_file(
     wanted = described.table.changed(values, given)
     refuse_computed(base, given, values)
     refuse_impossible_bodies(base.model, described, loaded.file, values, wanted)
-    text = rewrite(base.model, loaded.text, loaded.file, described, values, wanted, base.elements)
+    text, _ = rewrite(base.model, loaded.text, loaded.file, described, values, wanted, base.elements)
     edited = load_edited(base, text, wanted)
     accept(edited)
     _write(target, text, source)

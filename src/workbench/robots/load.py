@@ -26,6 +26,7 @@ from workbench.robots.catalogue import Source, find_source, robot_beside, robot_
 from workbench.robots.closed_form import ClosedForm
 from workbench.robots.description import Description, describe
 from workbench.robots.inertia import refuse_impossible_bodies
+from workbench.robots.number_checks import NumberChecks, checks_of
 from workbench.robots.parameters import Target
 from workbench.robots.robot_file import RobotFile
 from workbench.robots.values import is_written, quotient, read_number, read_parameters, rewrite
@@ -141,8 +142,8 @@ def with_overrides(base: Base, overrides: Mapping[str, float], *, whole: bool = 
     if quickly is not None:
         return quickly
     refuse_impossible_bodies(base.model, described, file, values, wanted)
-    text = rewrite(base.model, loaded.text, file, described, values, wanted, base.elements)
-    return _confirmed(base, text, described, wanted)
+    text, elements = rewrite(base.model, loaded.text, file, described, values, wanted, base.elements)
+    return _confirmed(base, text, elements, described, wanted)
 
 
 def no_parameters(file: str) -> ModelError:
@@ -192,6 +193,8 @@ class Base:
     setup: Setup | None
     computed: Mapping[str, Target]
     """parameters whose number does not stand in the file -> their place"""
+    checks: NumberChecks | None = field(default=None, repr=False, compare=False)
+    """what the numbers of a variant have to pass; None where the places of parameters cannot be looked at at once"""
     variants: Variants = field(default_factory=Variants, repr=False, compare=False)
     """how variants are made where there are many"""
 
@@ -227,11 +230,14 @@ def _read(
     described = describe(robot, model, text, elements, file)
     setup = setup or robot.setup
     _check(described, model, file, text, None)
-    values = read_parameters(model, described, file, text, elements)
-    _check(described, model, file, text, values, elements)
     computed = {t.reads: t for t in described.targets if t.reads and not is_written(text, elements, t)}
+    checks = checks_of(model, described, file, computed)
+    known = checks.read(model) if checks else None
+    values = read_parameters(model, described, file, text, elements, known)
+    if not (checks and checks.whole and checks.passed(model, values)):
+        _check(described, model, file, text, values, elements)
     loaded = _loaded(file, text, _prepared(whole, file, setup), described, values)
-    return Base(loaded, model, elements, folder, setup, computed)
+    return Base(loaded, model, elements, folder, setup, computed, checks)
 
 
 def _loaded(
@@ -260,21 +266,23 @@ def _check(
 ) -> None:
     """Refuse what the robot's formulas do not hold for; without formulas, places of a parameter that disagree."""
     if described.layout is not None:
-        refuse_broken(Context(model, described, file, text), values)
+        refuse_broken(Context(model, described, file, text, brief=True), values)
     elif values is not None and elements is not None:
         refuse_disagreement(model, described, file, text, elements, values)
 
 
-def _confirmed(base: Base, text: str, described: Description, wanted: Mapping[str, float]) -> LoadedModel:
+def _confirmed(
+    base: Base, text: str, elements: list[Element], described: Description, wanted: Mapping[str, float]
+) -> LoadedModel:
     """Compile an edited text, read it back and refuse it where it does not hold what was asked for."""
-    file = base.loaded.file
-    elements = scan(text, file)
+    file, checks = base.loaded.file, base.checks
     whole = open_source(text, file, base.folder, elements)
     model = whole.user
-    confirm(model, described, file, text, elements, wanted, base.computed)
     values = dict(wanted) if not base.computed else read_parameters(model, described, file, text, elements)
-    # the file's structure was checked once; only numbers that are parameters' own have changed since
-    _check(described, model, file, text, values, elements)
+    if not (checks and checks.whole and checks.passed(model, values)):
+        confirm(model, described, file, text, elements, wanted, base.computed)
+        # the file's structure was checked once; only numbers that are parameters' own have changed since
+        _check(described, model, file, text, values, elements)
     return _loaded(file, text, _prepared(whole, file, base.setup), described, values)
 
 

@@ -7,19 +7,21 @@ the caller asks those, which find it again and say so.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 
 import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.errors import WorkbenchError
 from workbench.robots.agreement import AGREE
 from workbench.robots.assumptions.rules import ALIGNMENT
 from workbench.robots.description import Description
 from workbench.robots.inertia import SMALLEST
 from workbench.robots.parameters import Target
 from workbench.robots.places import WHOLE
-from workbench.robots.values import FIELDS, index_of, inertia_matrix, vector
+from workbench.robots.values import FIELDS, Place, index_of, inertia_matrix, vector
 
 INERTIA = ("inertial", "diaginertia")
 
@@ -66,6 +68,8 @@ class NumberChecks:
         self, model: mujoco.MjModel, description: Description, file: str, computed: Collection[str] = ()
     ) -> None:
         targets = [t for t in description.targets if t.element != "geom"]
+        self.whole = all(t.optional for t in description.targets if t.element == "geom")
+        """whether all places are looked at but those that may be left out: a geom's numbers are read from the text"""
         names = tuple(description.table.infos)
         self._targets, self._products = targets, Products(targets, names)
         layout = description.layout
@@ -75,12 +79,16 @@ class NumberChecks:
         sources = [self._source(model, target, file) for target in targets]
         self._fields = tuple(dict.fromkeys(field for field, _ in sources))
         self._read = [(field, *self._rows(field, sources)) for field in self._fields]
-        self._plain = np.array([bool(field) for field, _ in sources], dtype=np.bool_)
+        self._others_read = [i for i, (field, _) in enumerate(sources) if not field]
+        """targets of which no array holds the number as it is"""
         self._exact = np.array([t.reads is not None and t.reads not in computed for t in targets], dtype=np.bool_)
         self._relative = np.array([t.attribute == "diaginertia" for t in targets], dtype=np.bool_)
         self._agreeing = np.array([t.reads is None and not t.optional for t in targets], dtype=np.bool_)
         self._aligned = layout is not None
         self._rest = self._others(model, file) if layout else {}
+        down = {t.index for t in targets if (t.element, t.attribute) == ("option", "gravity")} if layout else set()
+        self._level = sorted({0, 1, 2} - down) if down and WHOLE not in down else []
+        """numbers of gravity that have to be zero"""
         self._moving = self._bodies(model)
 
     def _source(self, model: mujoco.MjModel, target: Target, file: str) -> tuple[str, int]:
@@ -93,7 +101,7 @@ class NumberChecks:
         tag = "body" if target.element == "inertial" else target.element
         row = index_of(model, kind, tag, target.name, file)
         row = int(model.jnt_dofadr[row]) if field.startswith("dof_") else row
-        width = int(np.prod(getattr(model, field).shape[1:], dtype=np.int64))
+        width = math.prod(getattr(model, field).shape[1:])
         return field, row * width + target.index
 
     def _rows(self, field: str, sources: Sequence[tuple[str, int]]) -> tuple[np.ndarray, np.ndarray]:
@@ -139,18 +147,28 @@ class NumberChecks:
                 return False
         return True
 
-    def passed(self, model: mujoco.MjModel, wanted: Mapping[str, float]) -> bool:
-        """Whether *model* holds *wanted* bit for bit, and what the robot's formulas take for granted."""
-        expected = self._products(wanted)
+    def read(self, model: mujoco.MjModel) -> dict[Place, float]:
+        """The number at each place, but for geoms, which MuJoCo keeps in another form."""
+        found = self._numbers(model)[0].tolist()
+        return {(t.element, t.name, t.attribute, t.index): found[i] for i, t in enumerate(self._targets)}
+
+    def _numbers(self, model: mujoco.MjModel) -> tuple[FloatArray, FloatArray]:
+        """The number at each target ``(k,)``; and the inertias that are looked at, in their bodies' axes, flat."""
         found = np.empty(len(self._targets))
         matrices = np.array([inertia_matrix(model, body) for body in self._inertias]).reshape(-1)
         for field, rows, places in self._read:
             if field:
                 found[rows] = (matrices if field == "inertia" else getattr(model, field).reshape(-1))[places]
-        for i in np.flatnonzero(~self._plain):
+        for i in self._others_read:
             numbers = vector(model, self._targets[i], "")
             whole = self._targets[i].index == WHOLE
             found[i] = float(np.linalg.norm(numbers)) if whole else numbers[self._targets[i].index]
+        return found, matrices
+
+    def passed(self, model: mujoco.MjModel, wanted: Mapping[str, float]) -> bool:
+        """Whether *model* holds *wanted* bit for bit, and what the robot's formulas take for granted."""
+        expected = self._products(wanted)
+        found, matrices = self._numbers(model)
         if not np.array_equal(found[self._exact], expected[self._exact]):
             return False
         size = np.abs(expected)
@@ -158,9 +176,9 @@ class NumberChecks:
         gap = np.abs(found - expected)
         if not self._aligned:
             return bool((gap[self._agreeing] <= AGREE * scale[self._agreeing]).all())
-        # gravity's other numbers are few: they are left to the check that can speak
         return bool(
             (gap <= ALIGNMENT * scale).all()
+            and (np.abs(model.opt.gravity[self._level]) <= ALIGNMENT).all()
             and all(
                 (np.abs(getattr(model, f).reshape(-1)[places]) <= ALIGNMENT).all() for f, places in self._rest.items()
             )
@@ -175,6 +193,16 @@ class NumberChecks:
         limit = ALIGNMENT * np.abs(np.diagonal(mine, axis1=1, axis2=2)).max(axis=1)
         off = np.abs(mine[:, [0, 0, 1], [1, 2, 2]]).max(axis=1)
         return bool((off <= limit).all())
+
+
+def checks_of(
+    model: mujoco.MjModel, description: Description, file: str, computed: Collection[str]
+) -> NumberChecks | None:
+    """Checks of all numbers at once; None where a place is missing, which those can say that look at one by one."""
+    try:
+        return NumberChecks(model, description, file, computed)
+    except (WorkbenchError, LookupError):
+        return None
 
 
 def _body(model: mujoco.MjModel, name: str, file: str) -> int:

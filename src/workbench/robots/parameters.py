@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -126,6 +127,14 @@ class ParameterTable:
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     bars: tuple[Bar, ...] = ()
 
+    @cached_property
+    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest value of each parameter that is allowed; where the bound itself is not, its neighbour."""
+        infos = self.infos.values()
+        least = [i.minimum if i.minimum_allowed else np.nextafter(i.minimum, math.inf) for i in infos]
+        most = [i.maximum if i.maximum_allowed else np.nextafter(i.maximum, -math.inf) for i in infos]
+        return np.maximum(least, -LARGEST_NUMBER), np.minimum(most, LARGEST_NUMBER)
+
     def expand(self, changes: Mapping[str, float]) -> dict[str, float]:
         """Resolve names of groups to their members; a member that is named itself goes over its group.
 
@@ -173,6 +182,10 @@ class ParameterTable:
         ParameterError
             Naming the parameter, its value, its unit and what is allowed.
         """
+        lowest, highest = self._bounds
+        found = np.array([values[name] for name in self.infos], dtype=np.float64)
+        if ((lowest <= found) & (found <= highest)).all():
+            return
         for name, info in self.infos.items():
             value = values[name]
             low = value < info.minimum or (value == info.minimum and not info.minimum_allowed)

@@ -20,7 +20,8 @@ from workbench.mjcf.text import (
     PLAIN_DIGITS,
     Edit,
     Element,
-    replace_numbers,
+    numbers_replaced,
+    numbers_written,
     significant_digits,
     tokens,
     written,
@@ -41,6 +42,9 @@ FIELDS = {
     ("joint", "stiffness"): (mujoco.mjtObj.mjOBJ_JOINT, "jnt_stiffness"),
 }
 """Where the compiled model keeps an attribute."""
+
+Place = tuple[str, str, str, int]
+"""Element, name, attribute and index of a `Target`."""
 
 PRECISE = Context(prec=300)
 """Decimal digits for products of two doubles; they have 106 bits and are exact in this many digits for all lengths."""
@@ -73,8 +77,11 @@ def missing(model: mujoco.MjModel, kind: mujoco.mjtObj, tag: str, name: str) -> 
 
 def inertia_matrix(model: mujoco.MjModel, body: int) -> FloatArray:
     """Inertia of a body about its mass centre ``(3, 3)`` in kg m^2, in the axes of its body frame."""
+    quaternion = model.body_iquat[body]
+    if quaternion[0] == 1.0 and not quaternion[1:].any():  # what the product below gives, and many bodies are so
+        return np.diag(model.body_inertia[body])
     rotation = np.empty(9)
-    mujoco.mju_quat2Mat(rotation, model.body_iquat[body])
+    mujoco.mju_quat2Mat(rotation, quaternion)
     matrix = rotation.reshape(3, 3)
     result: FloatArray = matrix @ np.diag(model.body_inertia[body]) @ matrix.T
     return result
@@ -138,12 +145,17 @@ def is_written(text: str, elements: list[Element], target: Target) -> bool:
     """Whether a number stands literally in the file, so that it can be set; else MuJoCo computes it from others."""
     if target.element == "distance":
         return False
-    place = written(text, elements, target.element, target.name, target.attribute)
-    return place is not None and len(tokens(text, *place)) > max(target.index, 0)
+    count = numbers_written(text, elements, target.element, target.name, target.attribute)
+    return count > max(target.index, 0)
 
 
 def read_parameters(
-    model: mujoco.MjModel, description: Description, file: str, text: str, elements: list[Element]
+    model: mujoco.MjModel,
+    description: Description,
+    file: str,
+    text: str,
+    elements: list[Element],
+    known: Mapping[Place, float] | None = None,
 ) -> dict[str, float]:
     """Read every parameter from the compiled model.
 
@@ -154,6 +166,8 @@ def read_parameters(
     text, elements
         The MJCF's text and what `workbench.mjcf.text.scan` found in it: a fraction may be written with more than the 17
         digits of a double, to say which of several fractions with the same product is meant.
+    known
+        Numbers of *model* that were read already (`NumberChecks.read`).
 
     Raises
     ------
@@ -164,7 +178,8 @@ def read_parameters(
     """
     values: dict[str, float] = {}
     for target in sorted((t for t in description.targets if t.reads), key=lambda t: len(t.of)):
-        found = read_number(model, target, file, text, elements)
+        place = target.element, target.name, target.attribute, target.index
+        found = known[place] if known and place in known else read_number(model, target, file, text, elements)
         assert target.reads is not None
         others = math.prod(values[name] for name in target.of if name != target.reads)
         token = _token(text, elements, target) if len(target.of) > 1 else ""
@@ -231,8 +246,8 @@ def rewrite(
     values: Mapping[str, float],
     new: Mapping[str, float],
     elements: list[Element],
-) -> str:
-    """Return the MJCF text with parameters changed from *values* to *new*; see `replace_numbers`.
+) -> tuple[str, list[Element]]:
+    """Return the MJCF text with parameters changed from *values* to *new*, and its elements; see `numbers_replaced`.
 
     Places that the file does not write follow from others, or disagree with them, which is looked at after compiling.
 
@@ -252,7 +267,7 @@ def rewrite(
             index, factor = _only_component(vector(model, target, file), target, file)
         number = factor * target.number(new)
         edits.append(Edit(target.element, target.name, target.attribute, index, number, precise(target, new), optional))
-    return replace_numbers(text, file, edits, elements) if edits else text
+    return numbers_replaced(text, file, edits, elements) if edits else (text, elements)
 
 
 def _only_component(numbers: FloatArray, target: Target, file: str) -> tuple[int, float]:

@@ -29,7 +29,7 @@ from workbench.mjcf.same_robot import check_same_robot
 from workbench.mjcf.setup import Setup, plan, start
 from workbench.mjcf.source import Source, read_source
 from workbench.mjcf.text import Element, scan, tokens, written
-from workbench.robots.number_checks import NumberChecks, Products
+from workbench.robots.number_checks import Products
 from workbench.robots.parameters import Target
 from workbench.robots.places import WHOLE
 from workbench.robots.values import quotient, read_parameters, rewrite, vector
@@ -94,30 +94,37 @@ class _Numbers:
         self._products = Products([target for target, _, _ in placed], self._names)
         self._signs = np.array([sign for _, _, sign in placed])
         self._was = np.array([values[name] for name in self._names])
-        self._fields: list[tuple[Any, str, FloatArray, list[int], list[int]]] = []
-        """element, field, its vector in the file, and which number stands where in it"""
-        places: dict[tuple[tuple[str, str], str], int] = {}
-        for column, (_, number, _) in enumerate(placed):
+        self._fields: list[tuple[Any, str, int, int, bool]] = []
+        """element, field, where its vector begins and ends among all numbers, and whether it is a plain number"""
+        file: list[FloatArray] = []
+        starts: dict[tuple[tuple[str, str], str], int] = {}
+        count = 0
+        for _, number, _ in placed:
             key = number.owner, number.field
-            if key not in places:
-                places[key] = len(self._fields)
+            if key not in starts:
                 now = np.atleast_1d(np.array(getattr(number.element, number.field), dtype=np.float64))
-                self._fields.append((number.element, number.field, now, [], []))
-            field = self._fields[places[key]]
-            field[3].append(column)
-            field[4].append(number.index)
-        self._plain = {field for _, number, _ in placed for field in [number.field] if not number.size}
+                self._fields.append((number.element, number.field, count, count + len(now), not number.size))
+                starts[key], count = count, count + len(now)
+                file.append(now)
+        self._file = np.concatenate([*file, np.zeros(0)])
+        """the fields' vectors as the file has them, one after the other"""
+        self._places = np.array([starts[n.owner, n.field] + n.index for _, n, _ in placed], dtype=np.int64)
+        self._there: FloatArray | None = self._file.copy()
+        """what stands in the specification; None where that is not known"""
 
     def put(self, wanted: Mapping[str, float]) -> None:
         """Replace the numbers; where no parameter of a number changes, it is the file's own."""
-        moved = self._products.moved(np.array([wanted[name] for name in self._names]) != self._was).tolist()
-        numbers = (self._signs * self._products(wanted)).tolist()
-        for element, name, before, columns, places in self._fields:
-            now = before.copy()
-            for column, place in zip(columns, places, strict=True):  # of two that move one number the last counts
-                if moved[column]:
-                    now[place] = numbers[column]
-            setattr(element, name, now if name not in self._plain else float(now[0]))
+        moved = self._products.moved(np.array([wanted[name] for name in self._names]) != self._was)
+        now = self._file.copy()
+        # of two that move one number the last counts
+        now[self._places[moved]] = (self._signs * self._products(wanted))[moved]
+        there, self._there = self._there, None
+        differs = np.ones(len(now), dtype=np.bool_) if there is None else now.view(np.int64) != there.view(np.int64)
+        changed = differs.tolist()
+        for element, name, first, end, plain in self._fields:
+            if True in changed[first:end]:
+                setattr(element, name, float(now[first]) if plain else now[first:end])
+        self._there = now
 
 
 def _place(base: Base, spec: mujoco.MjSpec, target: Target) -> tuple[_Number, float] | None:
@@ -175,7 +182,8 @@ class _Kept:
         whole = dataclasses.replace(prepared, preparation=None)
         self._user = _Numbers(base, whole.spec())
         self._own = _Numbers(base, prepared.spec()) if prepared.preparation else None
-        self._checks = NumberChecks(base.model, base.loaded.description, self._file, base.computed)
+        assert base.checks is not None
+        self._checks = base.checks
         self._table = base.loaded.description.table
         self._computed = sorted(base.computed.values(), key=lambda target: len(target.of))
 
@@ -236,7 +244,7 @@ def _text(base: Base, wanted: Mapping[str, float]) -> str:
     loaded = base.loaded
     assert loaded.description is not None
     assert loaded.values is not None
-    return rewrite(base.model, loaded.text, loaded.file, loaded.description, loaded.values, wanted, base.elements)
+    return rewrite(base.model, loaded.text, loaded.file, loaded.description, loaded.values, wanted, base.elements)[0]
 
 
 def _source(base: Base, text: Callable[[], str]) -> Source:
@@ -246,7 +254,7 @@ def _source(base: Base, text: Callable[[], str]) -> Source:
 def _kept(base: Base) -> _Kept | None:
     """A specification that was shown to compile to what the text compiles to; None where it does not."""
     loaded = base.loaded
-    if loaded.description is None or loaded.values is None or loaded.prepared is None:
+    if loaded.description is None or loaded.values is None or loaded.prepared is None or base.checks is None:
         return None
     noted = loaded.prepared.notes[: len(loaded.prepared.notes) - len(_moved(loaded.prepared))]
     if noted or loaded.prepared.source.missing:  # options of the compiler, files that are not read

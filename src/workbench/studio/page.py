@@ -15,6 +15,7 @@ from workbench.robots.assignments import parse_assignment, resolve_changes
 from workbench.studio import words
 from workbench.studio.arrange import Panels
 from workbench.studio.curves import QUANTITIES, Curves
+from workbench.studio.hands import Hands
 from workbench.studio.keep import Keep
 from workbench.studio.keys import add_keys
 from workbench.studio.panels import Knobs
@@ -51,12 +52,9 @@ class Page:
         self._settling: threading.Timer | None = None
         self._moved: str | None = None
         """the slider that is in a hand"""
-        self._reached: str | None = None
-        """the slider whose reach was looked for last"""
-        self._placing = 0
-        """the thread that puts inputs somewhere; what they say in it is not a hand's"""
         self._ended = threading.Event()
         self.worker = Worker(self._fault)
+        self.hands = Hands(server.get_event_loop(), self._fault)
         server.gui.set_panel_label("workbench studio")
         self._theme()
         self.scene = Scene(server, dark)
@@ -89,8 +87,8 @@ class Page:
         Panels(self.server, panel)
         self.curves = Curves(gui)
         self.curves.in_the(self._dark)
-        self._quantity.on_update(lambda _: self._redraw_curves())
-        self._against.on_update(lambda _: self._compare())
+        self.hands.listen(self._quantity, lambda _: self.worker.ask("show", self._show))
+        self.hands.listen(self._against, self._compare)
 
     def _controls(self) -> None:
         gui: Any = self.server.gui
@@ -104,7 +102,7 @@ class Page:
         steps = gui.add_button_group("changes", ("Undo", "Redo", self.back_words()))
         tabs = gui.add_tab_group()
         with tabs.add_tab("Robot"):
-            self.knobs = Knobs(gui, self.session, self._knob)
+            self.knobs = Knobs(gui, self.session, self.hands, self._knob, self._touched)
             self._typed = gui.add_text(
                 "type", initial_value="", hint="a1=0.23, m2*=0.5; Enter; beyond the sliders, too"
             )
@@ -115,12 +113,13 @@ class Page:
             self._look_tab()
         with tabs.add_tab("Keep"):
             self.keep = Keep(gui, self.session)
-        self._play_button.on_click(lambda _: self.toggle())
-        self._time.on_update(lambda _: self._grabbed())
-        self._pace.on_update(lambda _: setattr(self, "_speed", float(self._pace.value)))
-        worst.on_click(lambda _: self.worst())
-        steps.on_click(lambda event: self.step(event.target.value))
-        typed.on_click(lambda _: self._type(self._typed.value))
+        hands = self.hands
+        hands.click(self._play_button, lambda _: self.toggle())
+        hands.listen(self._time, self._grabbed)
+        hands.listen(self._pace, lambda pace: setattr(self, "_speed", float(pace)))
+        hands.click(worst, lambda _: self.worst())
+        hands.click(steps, self.step)
+        hands.click(typed, lambda _: self._type(self._typed.value))
 
     def back_words(self) -> str:
         """What the way back is called."""
@@ -147,27 +146,26 @@ class Page:
                     f"{row.name} / {row.reference}", index in session.wanted.rows, hint=f"{row.name} against"
                     f" {row.reference}, {kind}{'; the campaign declares that it fails' if row.expect_fail else ''}",
                 )  # fmt: skip
-                box.on_update(lambda _: self._hold())
+                self.hands.listen(box, lambda _: self._hold())
                 self._held.append(box)
             if not self._held:
                 gui.add_markdown("No formulas. `--candidates FILE` brings some.")
-        self._case.on_update(lambda _: self._asked(lambda: session.put_on(str(self._case.value))))
-        self._amplitude.on_update(
-            lambda _: self._asked(lambda: session.move("amplitude", amplitude=float(self._amplitude.value)))
-        )
-        self._fast.on_update(lambda _: self._asked(lambda: session.move("speed", speed=float(self._fast.value))))
+        listen = self.hands.listen
+        listen(self._case, lambda case: self._asked(lambda: session.put_on(str(case))))
+        listen(self._amplitude, lambda x: self._asked(lambda: session.move("amplitude", amplitude=float(x))))
+        listen(self._fast, lambda x: self._asked(lambda: session.move("speed", speed=float(x))))
 
     def _look_tab(self) -> None:
         gui: Any = self.server.gui
         for mark in MARKS:
             box = gui.add_checkbox(mark, mark in self.scene.shown)
-            box.on_update(partial(self._switched, mark))
+            self.hands.listen(box, partial(self._switched, mark))
         gui.add_markdown(
             "Torques are drawn along the joints' axes in shares of each joint's peak, reactions in shares of the"
             " largest."
         )
         dark = gui.add_checkbox("dark", self._dark)
-        dark.on_update(lambda _: self._darken(bool(dark.value)))
+        self.hands.listen(dark, lambda on: self._darken(bool(on)))
         self.pointing = Pointing(self)
 
     # asking
@@ -175,11 +173,7 @@ class Page:
     def _asked(self, change: Callable[[], object]) -> None:
         """Change what is wanted; whatever is wrong with it is said on the page."""
         with self._lock:
-            if self._placing == threading.get_ident():
-                return
-            if self._moved is None or self._moved != self._reached:
-                self.knobs.forget_reach()
-                self._reached = None
+            self.knobs.forget_reach(self._moved)
             try:
                 change()
             except WorkbenchError as error:
@@ -189,6 +183,9 @@ class Page:
             self._settle_later()
             self._head.content = words.head(self.session, working=True)
         self.worker.ask("compute", self._compute, drop=("reach",))
+
+    def _touched(self, name: str) -> None:
+        self._moved = name
 
     def _knob(self, name: str, value: float) -> None:
         self._moved = name
@@ -248,14 +245,10 @@ class Page:
             reach = self.session.reach(name, lambda: self.worker.waiting)
             if self.worker.waiting:
                 return
-            self._reached = moved
             self.knobs.show_reach(name, reach)
 
-    def _compare(self) -> None:
-        self.session.against = str(self._against.value)
-        self.worker.ask("show", self._show)
-
-    def _redraw_curves(self) -> None:
+    def _compare(self, against: str) -> None:
+        self.session.against = against
         self.worker.ask("show", self._show)
 
     def _show(self) -> None:
@@ -285,14 +278,10 @@ class Page:
         session, wanted = self.session, self.session.wanted
         if session.problem is None:
             self.knobs.follow(session.values(), self._moved)
-        self._placing = threading.get_ident()
-        try:
-            self._case.value = wanted.case
-            self._amplitude.value, self._fast.value = wanted.amplitude, wanted.speed
-            for index, box in enumerate(self._held):
-                box.value = index in wanted.rows
-        finally:
-            self._placing = 0
+        self.hands.put([
+            (self._case, wanted.case), (self._amplitude, wanted.amplitude), (self._fast, wanted.speed),
+            *((box, index in wanted.rows) for index, box in enumerate(self._held)),
+        ])  # fmt: skip
 
     def _fault(self, error: BaseException) -> None:
         self.session.problem = f"a fault of the studio itself, {type(error).__name__}: {error}"
@@ -325,16 +314,12 @@ class Page:
             self._moment.content = words.moment(self.session.good, self.sample)
             self._put_time()
 
-    def _grabbed(self) -> None:
-        if self._placing != threading.get_ident():
-            wanted = int(self._time.value)
-            self.play(False)
-            self.at(wanted)
+    def _grabbed(self, sample: int) -> None:
+        self.play(False)
+        self.at(int(sample))
 
     def _put_time(self) -> None:
-        self._placing = threading.get_ident()
-        self._time.value = self.sample
-        self._placing = 0
+        self.hands.put([(self._time, self.sample)])
 
     def _play(self) -> None:
         last = marked = time.monotonic()
@@ -360,9 +345,9 @@ class Page:
 
     # looks
 
-    def _switched(self, mark: str, event: Any) -> None:
+    def _switched(self, mark: str, on: bool) -> None:
         with self._lock:
-            self.scene.switch(mark, bool(event.target.value))
+            self.scene.switch(mark, bool(on))
             self.scene.pose(self.sample)
 
     def _darken(self, dark: bool) -> None:
@@ -380,18 +365,22 @@ class Page:
         self.worker.ask("read", self._read_again)
 
     def _read_again(self) -> None:
-        problem = self.session.read_again()
-        if problem is not None:
-            self._head.content = words.head(self.session)
-            return
-        with self._lock:
+        with self._lock:  # what a hand asks for meanwhile is asked of the robot that was read
+            if self.session.read_again() is not None:
+                self._head.content = words.head(self.session)
+                return
             self.knobs.build()
         self._show()
+
+    def idle(self, timeout: float) -> bool:
+        """Wait until all that was done by hand is answered; false where a part takes longer than *timeout* seconds."""
+        return self.hands.idle(timeout) and self.worker.idle(timeout)
 
     def end(self) -> None:
         """Stop all threads of the page."""
         self._ended.set()
         if self._settling is not None:
             self._settling.cancel()
+        self.hands.end()
         self.worker.end()
         self._player.join(timeout=2.0)

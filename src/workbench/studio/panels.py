@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
+from workbench.studio.hands import Hands
 from workbench.studio.knobs import JOINTS, Knob
 from workbench.studio.session import Session
 from workbench.studio.words import number
@@ -42,13 +43,15 @@ def hint_of(knob: Knob, session: Session, reach: tuple[float, float] | None = No
 class Knobs:
     """Sliders in a viser panel."""
 
-    def __init__(self, gui: Any, session: Session, changed: Callable[[str, float], None]) -> None:
-        self._gui, self._session, self._changed = gui, session, changed
+    def __init__(
+        self, gui: Any, session: Session, hands: Hands,
+        changed: Callable[[str, float], None], touched: Callable[[str], None],
+    ) -> None:  # fmt: skip
+        self._gui, self._session, self._hands = gui, session, hands
+        self._changed, self._touched = changed, touched
         self._sliders: dict[str, Any] = {}
         self._reach: dict[str, tuple[float, float]] = {}
         self._folders: list[Any] = []
-        self._placing = 0
-        """the thread that puts sliders somewhere; what they say in it is not a hand's"""
         self.build()
 
     def build(self) -> None:
@@ -79,30 +82,26 @@ class Knobs:
             disabled=not knob.settable, hint=hint_of(knob, self._session),
         )  # fmt: skip
         self._sliders[knob.name] = slider
-
-        @slider.on_update
-        def _(_: Any) -> None:
-            if self._placing != threading.get_ident():
-                self._changed(knob.name, float(slider.value))
+        self._hands.listen(
+            slider, lambda value: self._changed(knob.name, float(value)), partial(self._touched, knob.name)
+        )
 
     def follow(self, values: Mapping[str, float], moved: str | None = None) -> None:
         """Put the sliders where the parameters are; *moved* is in a hand, and left alone."""
-        self._placing = threading.get_ident()
-        try:
-            for knob in self._session.knobs:
-                slider, value = self._sliders.get(knob.name), knob.value(values)
-                if slider is None or knob.name == moved:
-                    continue
-                if value < slider.min:
-                    slider.min = value
-                if value > slider.max:
-                    slider.max = value
-                slider.value = value
-                text = hint_of(knob, self._session, self._reach.get(knob.name))
-                if slider.hint != text:
-                    slider.hint = text
-        finally:
-            self._placing = 0
+        places = []
+        for knob in self._session.knobs:
+            slider, value = self._sliders.get(knob.name), knob.value(values)
+            if slider is None or knob.name == moved:
+                continue
+            if value < slider.min:
+                slider.min = value
+            if value > slider.max:
+                slider.max = value
+            places.append((slider, value))
+            text = hint_of(knob, self._session, self._reach.get(knob.name))
+            if slider.hint != text:
+                slider.hint = text
+        self._hands.put(places)
 
     def show_reach(self, name: str, reach: tuple[float, float]) -> None:
         """Let a slider end where the motion leaves the robot's reach."""
@@ -110,19 +109,19 @@ class Knobs:
         if slider is None:
             return
         self._reach[name] = reach
-        self._placing = threading.get_ident()
-        try:
-            low, high = min(reach[0], slider.value), max(reach[1], slider.value)
-            if low < high and (slider.min, slider.max) != (low, high):
-                slider.min, slider.max = low, high
-            slider.hint = hint_of(knob, self._session, reach)
-        finally:
-            self._placing = 0
+        low, high = min(reach[0], slider.value), max(reach[1], slider.value)
+        if low < high and (slider.min, slider.max) != (low, high):
+            slider.min, slider.max = low, high
+        slider.hint = hint_of(knob, self._session, reach)
 
-    def forget_reach(self) -> None:
-        """Give the sliders their whole range back: what is in reach has changed."""
-        names, self._reach = tuple(self._reach), {}
+    def forget_reach(self, kept: str | None) -> None:
+        """Give the sliders their whole range back, what is in reach has changed; but not the one in a hand.
+
+        Its own reach does not depend on where it stands, and its ends may not move under the hand.
+        """
+        names = [name for name in self._reach if name != kept]
         for name in names:
+            del self._reach[name]
             slider, knob = self._sliders.get(name), self._session.knob(name)
             if slider is not None:
                 slider.min, slider.max = min(knob.low, slider.value), max(knob.high, slider.value)

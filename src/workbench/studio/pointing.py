@@ -31,8 +31,8 @@ class Pointing:
             self._plane = gui.add_dropdown("workspace slice", (NONE, *self._planes))
             self._drag = gui.add_checkbox("drag the platform", False, disabled=not self._usable())
             self._said = gui.add_html("")
-        self._plane.on_update(lambda _: page.worker.ask("slice", self._slice))
-        self._drag.on_update(lambda _: self._grip_or_not())
+        page.hands.listen(self._plane, lambda _: page.worker.ask("slice", self._slice))
+        page.hands.listen(self._drag, lambda _: self._grip_or_not())
         self._grip: Any = None
 
     def _usable(self) -> bool:

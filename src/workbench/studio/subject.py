@@ -130,6 +130,10 @@ def open_subject(
     path = Path(what)
     if (path / store.MANIFEST).is_file():
         return _of_run(path, what, model, given, names, users)
+    if (path / store.REPORTS[0]).is_file():
+        raise OutputError(
+            f"{what}: a report without its results, {store.MANIFEST} is not there; workbench run CAMPAIGN makes a run"
+        )
     if what in campaign_names() or (path.suffix == ".toml" and path.is_file() and "case" in read_toml(path, what)):
         return _of_campaign(path, what, model, given, names, users)
     return _of_robot(what, model, given, names, users)

@@ -17,12 +17,13 @@ from workbench.campaign.evidence import Effort
 from workbench.campaign.not_driven import NotDriven, refuse_none
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate, full_names, load_candidates, with_rows
+from workbench.processes import cores
 from workbench.sweep.evaluate import Context, evaluate, series_bytes
 from workbench.sweep.identity import common_key
 from workbench.sweep.pick import pick_cases
 from workbench.sweep.plan import plan_sweep
 from workbench.sweep.record import FILTERED, GOOD
-from workbench.sweep.run import cores, task_of
+from workbench.sweep.run import task_of
 
 TRIED = 24
 """Cases of a sweep that are computed for an estimate, spread over it."""

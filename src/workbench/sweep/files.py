@@ -21,8 +21,6 @@ import pyarrow.parquet as pq
 from workbench import reading
 from workbench.campaign import store
 from workbench.campaign.compare import Row
-from workbench.staging import DirectoryKind
-from workbench.sweep import journal as journal_file
 from workbench.sweep.journal import Journal
 from workbench.sweep.plan import Plan
 from workbench.sweep.record import Record
@@ -37,21 +35,6 @@ PART_CASES = 2000
 
 LARGEST_PART = 2_000_000_000
 """Bytes of one part that are read."""
-
-FINISHED = (STATE, SWEEP, CASES, SUMMARY, store.MANIFEST, store.SERIES, *store.REPORTS)
-WORKING = (PROGRESS, journal_file.NAME)
-LEFT_BEHIND = (
-    *(f".{name}.part" for name in (STATE, SWEEP, PROGRESS, store.MANIFEST, journal_file.NAME)),
-    *(f".{name}.new" for name in (CASES, SUMMARY)),
-)
-"""What a killed run may leave."""
-
-RUN = DirectoryKind(
-    what="run",
-    marker=STATE,
-    keys=frozenset({"format", "campaign", "versions"}),
-    members=(*FINISHED, *WORKING, *LEFT_BEHIND),
-)
 
 TEXTS = ("candidate", "reference", "joint", "verdict", "kind", "unit")
 SUMMARY_SCHEMA = pa.schema(

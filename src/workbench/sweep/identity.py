@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from workbench.campaign import provenance
-from workbench.campaign.cases import locate, robot_files
+from workbench.campaign.cases import robot_files, tables_of
 from workbench.campaign.evidence import Effort
-from workbench.campaign.motion_spec import TableMotion
 from workbench.campaign.robot_spec import RobotKeys
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import UserCandidate
@@ -71,16 +70,12 @@ def common_key(
     users: Sequence[UserCandidate] = (),
 ) -> str:
     """Hash of everything that the cases of a sweep share."""
-    motion = campaign.case[0].motion
-    table = ""
-    if isinstance(motion, TableMotion):
-        table = provenance.sha256(locate(file, motion.file, "motion.file").read_bytes())
     filters = campaign.sweep.filter.model_dump() if campaign.sweep else {}
     return _digest(
         {
             "versions": versions(),
             "robot": [provenance.sha256(path.read_bytes()) for path in robot_files(campaign, file, model)],
-            "table": table,
+            "tables": [provenance.sha256(path.read_bytes()) for path in tables_of(campaign, file)],
             "candidates": [candidate.model_dump(exclude={"printed_cost"}) for candidate in campaign.candidate],
             "parameters": campaign.parameters,
             "settings": dict(settings),

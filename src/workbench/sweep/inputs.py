@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.campaign import provenance
-from workbench.campaign.cases import locate, robot_files
-from workbench.campaign.motion_spec import TableMotion
+from workbench.campaign.cases import robot_files, tables_of
 from workbench.campaign.spec import Campaign
 
 
@@ -49,7 +48,5 @@ def _look(path: Path) -> _Seen:
 
 
 def inputs_of(campaign: Campaign, file: Path, model: Path) -> Inputs:
-    """The model with its robot file, and the table of a motion given by one."""
-    motion = campaign.case[0].motion
-    tables = [locate(file, motion.file, "motion.file")] if isinstance(motion, TableMotion) else []
-    return Inputs([*robot_files(campaign, file, model), *tables])
+    """The model with its robot file, and the tables of motions given by them."""
+    return Inputs([*robot_files(campaign, file, model), *tables_of(campaign, file)])

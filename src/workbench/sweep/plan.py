@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +33,7 @@ class Recipe:
 
     def case_dict(self, index: int, numbers: tuple[float, ...]) -> dict[str, Any]:
         """Return the case as a plain dictionary, not validated."""
-        case = copy.deepcopy(dict(self.case))
+        case = {name: _copied(value) for name, value in self.case.items()}
         pairs = zip(self.changes, numbers, strict=True)
         # what else varies may be a frequency or a time, which the speed is a factor of
         for change, number in sorted(pairs, key=lambda pair: pair[0].key == SPEED):
@@ -45,6 +44,13 @@ class Recipe:
     def case_spec(self, index: int, numbers: tuple[float, ...]) -> CaseSpec:
         """Return the case, validated."""
         return CaseSpec.model_validate(self.case_dict(index, numbers))
+
+
+def _copied(value: Any) -> Any:
+    """Plain lists and dictionaries, to be changed: the same as `copy.deepcopy`, which takes ten times as long."""
+    if isinstance(value, dict):
+        return {name: _copied(entry) for name, entry in value.items()}
+    return [_copied(entry) for entry in value] if isinstance(value, list) else value
 
 
 @dataclass(frozen=True)

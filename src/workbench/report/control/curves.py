@@ -73,7 +73,7 @@ def curve(run: StudyRun, over: str, case: str, fixed: float, bandwidth: float) -
         axes.axhline(wanted, color=ALARM, linewidth=0.9, linestyle=(0, (6, 2)))
         axes.set_xscale("log")
         ticks = sorted({p[0] for points in lines.values() for p in points})
-        axes.xaxis.set_major_locator(FixedLocator(_sparse(ticks)))
+        axes.xaxis.set_major_locator(FixedLocator(sparse(ticks)))
         axes.xaxis.set_minor_locator(NullLocator())
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.set_ylabel("platform, rms [mm]")
@@ -87,7 +87,8 @@ def curve(run: StudyRun, over: str, case: str, fixed: float, bandwidth: float) -
     return Plot(key, WIDE, draw, alt, caption)
 
 
-def _sparse(ticks: Sequence[float]) -> list[float]:
+def sparse(ticks: Sequence[float]) -> list[float]:
+    """At most seven of the places on an axis, evenly taken."""
     return list(ticks) if len(ticks) <= 7 else list(ticks[:: math.ceil(len(ticks) / 7)])
 
 

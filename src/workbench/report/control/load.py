@@ -15,6 +15,8 @@ from workbench.records import Record, read_record
 from workbench.report.manifest import Manifest
 
 LARGEST = 1_000_000_000
+MOST_ROWS = 400
+"""Rows of a table of all runs; the rest stands in errors.parquet."""
 TEXTS = frozenset({"case", "controller", "model", "rate_asked", "status", "reason", "joint"})
 
 

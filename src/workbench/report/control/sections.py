@@ -7,15 +7,14 @@ from typing import Any
 
 from workbench.control.names import NOT_RUN
 from workbench.report.control.curves import RATE, SPEED, curve, is_number
-from workbench.report.control.load import StudyRun
+from workbench.report.control.gap import gap_section
+from workbench.report.control.load import MOST_ROWS, StudyRun
 from workbench.report.plot import Plot
 from workbench.report.section import Section, plain_section
 from workbench.report.sections import NO_REAL_ROBOT, parameters_section, reproduce_section
-from workbench.report.tables import HOLDS, REFUTED, UNDECIDED, Cell, Status, Table, columns
+from workbench.report.tables import HOLDS, NOT_ABOUT, REFUTED, UNDECIDED, Cell, Status, Table, columns
 
-LOOKS = {"holds": HOLDS, "does not hold": REFUTED}
-MOST_ROWS = 400
-"""Rows of the table of all errors; the rest stands in errors.parquet."""
+LOOKS = {"holds": HOLDS, "does not hold": REFUTED, NOT_ABOUT.text: NOT_ABOUT}
 
 DECIDED = 0.1
 """An error that is not known to this part of itself is called undecided."""
@@ -27,7 +26,7 @@ def study_sections(run: StudyRun) -> list[Section]:
         _answer_section(run),
         _over_section(run, RATE, "Tracking error over the control rate"),
         _over_section(run, SPEED, "Tracking error over the speed"),
-        _gap_section(run),
+        gap_section(run),
         _unstable_section(run),
         _errors_section(run),
         _setting_section(run),
@@ -58,6 +57,7 @@ def _answer_section(run: StudyRun) -> Section:
         for claim in study.claims:
             differing = [name for name, verdict in claim.varied.items() if verdict not in (claim.verdict, NOT_RUN)]
             robust = "the same throughout" if not differing else "another verdict with: " + ", ".join(differing)
+            robust = robust if claim.varied else ""
             rows.append(
                 (
                     Cell(claim.text), Cell(claim.source), Cell(status=_status(claim.verdict)),
@@ -75,20 +75,24 @@ def _answer_section(run: StudyRun) -> Section:
                 " share with half the plant's step, or by MuJoCo's own integrator and loops.",
             )
         )
-        names = list(dict.fromkeys(name for claim in study.claims for name in claim.varied))
-        tables.append(
-            Table(
-                "control-varied",
-                "The same verdicts with step, integrator and gains varied.",
-                columns(("Claim", *names)),
-                tuple(
-                    (Cell(claim.id), *(_varied(claim.varied.get(name, NOT_RUN)) for name in names))
-                    for claim in study.claims
-                ),
-                "Each column judges all claims again: by runs at half the step, by MuJoCo's route, by one bandwidth.",
-            )
-        )
+        tables += _varied_table(run)
     return plain_section("answer", "Is the model enough for control", [run.manifest.verdict, counts], tables)
+
+
+def _varied_table(run: StudyRun) -> list[Table]:
+    claims = [claim for claim in run.study.claims if claim.varied]
+    names = list(dict.fromkeys(name for claim in claims for name in claim.varied))
+    if not claims:
+        return []
+    return [
+        Table(
+            "control-varied",
+            "The same verdicts with step, integrator and gains varied.",
+            columns(("Claim", *names)),
+            tuple((Cell(claim.id), *(_varied(claim.varied.get(name, NOT_RUN)) for name in names)) for claim in claims),
+            "Each column judges all claims again: by runs at half the step, by MuJoCo's route, by one bandwidth.",
+        )
+    ]
 
 
 def _cases(run: StudyRun) -> list[str]:
@@ -116,85 +120,6 @@ def _over_section(run: StudyRun, over: str, title: str) -> Section | None:
 def _with_figures(key: str, title: str, plots: list[Plot], note: str) -> Section:
     context = {"paragraphs": [], "tables": [], "figures": plots, "note": note}
     return Section(key, title, "sweep", context, tuple(plots))
-
-
-def _gap_section(run: StudyRun) -> Section | None:
-    """The error that a model adds, as a share of what remains anyway, at every place that two models share."""
-    by_place: dict[tuple[Any, ...], dict[str, dict[str, Any]]] = {}
-    for row in run.runs:
-        error = run.platform(row)
-        if error is not None and row["model"] != "none" and row["rate_asked"] != "printed cost":
-            place = row["case"], row["controller"], row["speed"], row["rate"], row["bandwidth"]
-            by_place.setdefault(place, {})[row["model"]] = error
-    models = list(dict.fromkeys(claim for claim in _models(run)))
-    if len(models) < 2:
-        return None
-    least = _best_model(by_place, models)
-    rows = []
-    for place, errors in by_place.items():
-        if least not in errors:
-            continue
-        for model, error in errors.items():
-            if model == least:
-                continue
-            share = error["rms"] / errors[least]["rms"] - 1.0
-            routes = ("rms_halved", "rms_second")
-            other = [
-                error[r] / errors[least][r] - 1.0 for r in routes if is_number(error[r]) and is_number(errors[least][r])
-            ]
-            known = max((abs(value - share) for value in other), default=math.nan)
-            rows.append((place, model, share, known, error["rms"], errors[least]["rms"]))
-    if not rows:
-        return None
-    table = Table(
-        "control-gap",
-        f"What a model adds to the error that remains with {least}, all else equal (rate, delay, encoder, gains).",
-        columns(
-            ("Case", "Controller", "Model", "Speed", "Rate [Hz]", "Bandwidth [Hz]", "Adds", "Known to", "Error [mm]",
-             f"With {least} [mm]"),
-            numeric=("Speed", "Rate [Hz]", "Bandwidth [Hz]", "Adds", "Known to", "Error [mm]", f"With {least} [mm]"),
-        ),
-        tuple(
-            (
-                Cell(place[0]), Cell(place[1]), Cell(model), Cell(f"{place[2]:g}", place[2]),
-                Cell(f"{place[3]:g}", place[3]), Cell(f"{place[4]:g}", place[4]),
-                Cell(f"{100 * share:+.3g} %", share, emphasis=share > run.study.enough),
-                Cell("–" if math.isnan(known) else f"{100 * known:.2g} %", known),
-                Cell(f"{1e3 * error:.3g}", error), Cell(f"{1e3 * base:.3g}", base),
-            )
-            for place, model, share, known, error, base in rows[:MOST_ROWS]
-        ),
-        f"Shares above {100 * run.study.enough:g} % stand out. All {len(rows)} of them follow from errors.parquet.",
-    )  # fmt: skip
-    return plain_section("gap", "What the model adds", _where_it_matters(run, rows), [table])
-
-
-def _models(run: StudyRun) -> list[str]:
-    return [row["model"] for row in run.runs if row["model"] != "none"]
-
-
-def _best_model(by_place: dict[tuple[Any, ...], dict[str, dict[str, Any]]], models: list[str]) -> str:
-    """The model with the least errors, summed as logarithms over the places that all share."""
-    shared = [errors for errors in by_place.values() if all(model in errors for model in models)]
-    return min(models, key=lambda model: sum(math.log(max(errors[model]["rms"], 1e-12)) for errors in shared))
-
-
-def _where_it_matters(run: StudyRun, rows: list[tuple[Any, ...]]) -> list[str]:
-    """Where a model begins to matter: the slowest speed at which it adds more than is called enough."""
-    said = []
-    for case, controller, model in dict.fromkeys((row[0][0], row[0][1], row[1]) for row in rows):
-        mine = [row for row in rows if (row[0][0], row[0][1], row[1]) == (case, controller, model)]
-        over = [row for row in mine if row[2] > run.study.enough and row[4] > run.study.wanted_m]
-        if over:
-            first = min(over, key=lambda row: (row[0][2], row[0][3]))
-            said.append(
-                f"{case}, {controller}: {model} begins to matter at speed {first[0][2]:g}, {first[0][3]:g} Hz and"
-                f" {first[0][4]:g} Hz bandwidth, where it adds {100 * first[2]:.3g} %; it matters at {len(over)} of"
-                f" {len(mine)} places."
-            )
-        else:
-            said.append(f"{case}, {controller}: {model} does not matter at any of {len(mine)} places.")
-    return said
 
 
 def _unstable_section(run: StudyRun) -> Section | None:
@@ -315,6 +240,26 @@ def _limits_section(run: StudyRun) -> Section:
         "What is stable here may grow slowly: a loop is called unstable only when a joint has left its stroke within "
         "the time that is tracked.",
     ]
+    points += _step_left_open(run)
     if run.study.undecided:
         points.append(f"{run.study.undecided} errors are not known to a tenth of themselves and decide nothing.")
     return Section("limits", "Limits and caveats", "limits", {"points": points})
+
+
+def _step_left_open(run: StudyRun) -> list[str]:
+    """What is not known of the plant's step where no run was made again at its half."""
+    tracked = [(row, error) for row in run.runs if (error := run.platform(row)) is not None]
+    halved = [(row["rate"], error) for row, error in tracked if is_number(error["rms_halved"])]
+    missing = sum(not is_number(error["rms_halved"]) for _, error in tracked)
+    if not missing:
+        return []
+    said = f"{missing} of {len(tracked)} runs were not made again at half the plant's step; above 2 kHz none are"
+    if not halved:
+        return [f"{said}. What the step costs there is known by MuJoCo's route alone."]
+    rate = max(rate for rate, _ in halved)
+    most = max(abs(e["rms_halved"] / e["rms"] - 1.0) for at, e in halved if at == rate and e["rms"] > 0.0)
+    return [
+        f"{said}. Steps are shorter there, and at {rate:g} Hz half of it changed no error by more than"
+        f" {100 * most:.2g} %. What it changes above is known by MuJoCo's route alone, which takes steps of the same"
+        " length in other coordinates; were both to err alike, nothing here would show it."
+    ]

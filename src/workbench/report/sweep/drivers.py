@@ -9,6 +9,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from workbench.report.layout import size_of
+from workbench.report.light_axis import LightAxes
 from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.style import INK, PALETTE
@@ -69,7 +70,8 @@ def _bars(key: str, drivers: Sequence[DriverRecord], against: str) -> Plot:
 
     def draw(figure: FigureBase) -> None:
         width, height = size_of(figure)
-        axes = figure.add_axes((LABEL_ROOM / width, 0.42 / height, 1 - (LABEL_ROOM + 0.15) / width, 1 - 0.55 / height))
+        box = (LABEL_ROOM / width, 0.42 / height, 1 - (LABEL_ROOM + 0.15) / width, 1 - 0.55 / height)
+        axes = figure.add_axes(box, axes_class=LightAxes)
         for place, driver in enumerate(reversed(shown)):
             value = driver.rank_correlation
             axes.add_patch(
@@ -112,10 +114,8 @@ def _courses(
         room, tall = (width - 0.72 - 0.1) / across, (height - 0.12) / down
         for place, driver in enumerate(drivers):
             column, row = place % across, place // across
-            axes = figure.add_axes(
-                ((0.72 + column * room) / width, 1 - (0.12 + (row + 1) * tall - 0.46) / height,
-                 (room - 0.16) / width, (tall - 0.56) / height)
-            )  # fmt: skip
+            corner = (0.72 + column * room) / width, 1 - (0.12 + (row + 1) * tall - 0.46) / height
+            axes = figure.add_axes((*corner, (room - 0.16) / width, (tall - 0.56) / height), axes_class=LightAxes)
             record = run.key(driver.key)
             logarithmic = scale_of(run, driver.key) == "log" and bins[driver.key][0].low > 0
             centres = [

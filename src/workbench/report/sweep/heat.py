@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import FloatArray
 from workbench.report.layout import size_of
+from workbench.report.light_axis import LightAxes
 from workbench.report.plot import Plot
 from workbench.report.section import Section
 from workbench.report.style import GRID
@@ -146,7 +147,7 @@ def _plot(key: str, found: Map, against: str) -> Plot:
         norm = LogNorm(smallest, max(float(np.nanmax(found.worst)), smallest * 1.01))
         for turn, (title, cells) in enumerate((("median", found.median), ("largest", found.worst))):
             box = ((left + turn * (room + gap)) / width, bottom / height, room / width, 1 - (top + bottom) / height)
-            axes = figure.add_axes(box)
+            axes = figure.add_axes(box, axes_class=LightAxes)
             axes.set_title(f"{title} of the designs in the cell", fontsize=8.5)
             _cells(axes, found, cells, norm)
             axes.set_xlabel(found.across.label)

@@ -49,6 +49,10 @@ class Assumption:
     attribute: str = ""
 
 
+KEPT = Assumption("", "", "", "", True, "")
+"""Any assumption that a model keeps, where nobody asks which."""
+
+
 @dataclass
 class Context:
     """A compiled model beside the mechanism that it is said to describe."""
@@ -57,6 +61,8 @@ class Context:
     mechanism: Description
     file: str
     text: str
+    brief: bool = False
+    """whether what is kept need not be worded: `KEPT` stands for all of it"""
     _elements: list[Element] | None = field(default=None, repr=False)
 
     @property
@@ -91,6 +97,8 @@ class Context:
         self, name: str, tag: str, element: str, attribute: str, value: str, limit: str, ok: bool, why: str = ""
     ) -> Assumption:
         """An assumption about an attribute of an element; *why* ends the message where it is broken."""
+        if ok and self.brief:
+            return KEPT
         label = f'{tag} "{element}" {attribute}'.rstrip() if element else f"{tag} {attribute}".rstrip()
         message = ""
         if not ok:
@@ -125,7 +133,9 @@ def vector_rule(
 ) -> Assumption:
     """The assumption that a vector is another one, within `ALIGNMENT`."""
     wanted = np.asarray(expected, dtype=np.float64)
-    gap = float(np.max(np.abs(value - wanted)))
+    gap = float(np.abs(value - wanted).max())
+    if context.brief and gap <= ALIGNMENT:
+        return KEPT
     limit = f"{show(wanted)} within {ALIGNMENT:g}"
     return context.rule(name, tag, element, attribute, show(value), limit, gap <= ALIGNMENT, why)
 
@@ -139,6 +149,8 @@ def text_rule(
     context: Context, name: str, tag: str, element: str, attribute: str, value: str, valid: tuple[str, ...]
 ) -> Assumption:
     """The assumption that a name is one of some."""
+    if context.brief and value in valid:
+        return KEPT
     hint = "" if value in valid else did_you_mean(value, valid).lstrip("; ")
     quoted = " or ".join(f'"{v}"' for v in valid)
     return context.rule(
