@@ -18,7 +18,7 @@ FLOORS_TESTS ?= $(patsubst %,tests/test_%.py,campaign_run campaign_spec case_fig
   edited_runs mjcf_roundtrip mjcf_setup pinocchio_reference portable recorded reference_closure rendering report_formats \
   report_pictures statements studio_session sweep_run urdf)
 # Campaigns whose reports are kept in reports/published.
-PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models design_sweep
+PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models design_sweep control_4rprp
 
 # Installs the package: environment, constraints, extra.
 install = $(if $(UV),"$(UV)" pip install --quiet --python $(1)/bin/python,$(1)/bin/python -m pip install --quiet --disable-pip-version-check) --constraint $(2) --editable '.[$(3)]'
@@ -86,7 +86,7 @@ mutants: $(STAMP) ## Plant small faults in the core modules and see which no tes
 reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings in their heads differ
 	@for name in $(PUBLISHED); do \
 	  built=build/reports/$$name; kept=reports/published/$$name; drawn=build/pictures/$$name; \
-	  if [ ! -d $$kept/pictures ] && ! grep -q '^\[sweep\]' campaigns/$$name.toml; then \
+	  if [ ! -d $$kept/pictures ] && ! grep -qE '^\[(sweep|control)\]' campaigns/$$name.toml; then \
 	    $(BIN)/workbench run campaigns/$$name.toml --quick --out $$drawn >/dev/null || exit 1; \
 	    if [ -f $$drawn/pictures/film.webp ]; then mkdir -p $$kept; cp -R $$drawn/pictures $$kept/pictures; fi; \
 	  fi; \

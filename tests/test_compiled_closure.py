@@ -128,6 +128,9 @@ def test_a_long_motion_meets_at_its_chunks_and_is_the_same_on_threads() -> None:
     reference._closer = LoopCloser(reference._closer.engine, reference._closer.structure, compiled=False)
     before = reference.inverse_dynamics(q, qd, qdd, along=t)
     assert np.abs(one.tau - before.tau).max() <= 1e-12 * np.abs(before.tau).max()
+    # a sample is factored where it is closed, wherever the steps that led there had their factor from
+    np.testing.assert_allclose(one.condition, before.condition, rtol=1e-10)
+    assert one.velocity_residual.max() <= 1e-12 * np.abs(qd).max()
 
 
 def test_a_chunk_that_begins_on_another_assembly_is_followed_again(

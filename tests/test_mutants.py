@@ -92,13 +92,16 @@ def test_a_short_run_begins_with_what_is_quick_and_leaves_out_what_fails_by_itse
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     without_fault = {
-        "a.py": ({"a.py::slow": 9.0, "a.py::quick": 0.2, "a.py::quicker": 0.1, "a.py::broken": 0.0}, ["a.py::broken"]),
+        "a.py": (
+            {"a.py::slow": 2.0, "a.py::slowest": 9.0, "a.py::quick": 0.2, "a.py::quicker": 0.1, "a.py::broken": 0.0},
+            ["a.py::broken"],
+        ),
         "b.py": ({"b.py::quick": 0.05, "b.py::slow": 1.0}, []),
     }
     monkeypatch.setattr(short, "_without_fault", lambda file, uncompiled: without_fault[file])
     tests, total, failing = short.tests_of(("a.py", "b.py"), uncompiled=False)
     assert tests == ["a.py::quicker", "a.py::quick", "b.py::quick", "a.py::slow", "b.py::slow"]
-    assert total == pytest.approx(10.35)
+    assert total == pytest.approx(3.35)
     assert failing == ["a.py::broken"]
 
 

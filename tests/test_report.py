@@ -608,7 +608,7 @@ def test_plots_tell_the_script_their_scales(run: Path) -> None:
         for tag, attributes in parse(run).tags
         if tag == "svg" and "aria-label" in attributes
     }
-    panels = json.loads(str(drawings["Case sim1, joint q2: force or "]["data-panels"]))
+    panels = json.loads(str(drawings["Case sim1: τ2 in N·m over time"]["data-panels"]))
     assert [panel["log"] for panel in panels] == [False, True]
     assert panels[0]["name"] == "τ2 [N·m]"
     assert panels[0]["curves"] == list(CANDIDATES)

@@ -5,6 +5,7 @@ It is written beside its place and moved there when it is whole (`workbench.stag
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import json
 from collections.abc import Collection, Mapping
@@ -12,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from workbench.arrays import FloatArray
 from workbench.campaign.compare import Row
 from workbench.campaign.good import good_enough
+from workbench.parquet_columns import column_bytes
 from workbench.staging import DirectoryKind
 
 FORMAT = 1
@@ -37,9 +38,7 @@ def write_series(stage: Path, case: str, columns: Mapping[str, FloatArray]) -> N
     """Write one case's time series as Parquet; the same numbers give the same bytes."""
     folder = stage / SERIES
     folder.mkdir(exist_ok=True)
-    # by way of memory: Arrow opens no file whose name is not UTF-8
-    content = pd.DataFrame(dict(columns)).to_parquet(index=False, write_page_checksum=True)
-    (folder / f"{case}.parquet").write_bytes(content)
+    (folder / f"{case}.parquet").write_bytes(column_bytes(columns))
 
 
 def write_summary(stage: Path, rows: list[Row], changed: Collection[str] = (), good: float | None = None) -> None:
@@ -48,10 +47,20 @@ def write_summary(stage: Path, rows: list[Row], changed: Collection[str] = (), g
     *changed* names the cases whose robot is not the one that the campaign's claims and sources are about; *good*
     is the accuracy that is wanted of formulas without a bound.
     """
-    frame = pd.DataFrame([dataclasses.asdict(row) for row in rows], columns=[f.name for f in dataclasses.fields(Row)])
-    frame["robot"] = ["changed" if row.case in changed else "published" for row in rows]
-    frame["good_enough"] = [good_enough(row, good) for row in rows]
-    frame.to_csv(stage / SUMMARY, index=False, lineterminator="\n")
+    names = [field.name for field in dataclasses.fields(Row)]
+    with (stage / SUMMARY).open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow([*names, "robot", "good_enough"])
+        for row in rows:
+            robot = "changed" if row.case in changed else "published"
+            cells = [*(getattr(row, name) for name in names), robot, good_enough(row, good)]
+            table.writerow([_cell(cell) for cell in cells])
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, float):
+        return "" if np.isnan(value) else repr(float(value))
+    return "" if value is None else value
 
 
 def write_manifest(stage: Path, manifest: Mapping[str, Any]) -> None:

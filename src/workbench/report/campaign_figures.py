@@ -25,7 +25,7 @@ from workbench.report.load import Run, Series
 from workbench.report.manifest import FigureRecord
 from workbench.report.plot import Plot
 from workbench.report.style import PALETTE
-from workbench.report.text import exact, pretty_unit, torque_label
+from workbench.report.text import exact, pretty_unit, torque_label, torque_name
 
 LINEAR_FROM = 1e-4
 """Errors over cases that are all at least this large are drawn in percent from zero; smaller ones on a log axis."""
@@ -174,7 +174,8 @@ def _campaign_torque(run: Run, record: FigureRecord, key: str, series: Series, a
         error_panel(below, errors, [])
 
     comparison = f"; below, the error of {' and of '.join(said)} over the latter's peak" if said else ""
-    alt = f"{record.title}: {joint} in {unit} over time of {', '.join(c.label for c in curves)}{comparison}."
+    shown = f"{torque_name(joint)} in {unit} over time of {', '.join(c.label for c in curves)}"
+    alt = f"{record.title}: {shown}{comparison}."
     return Plot(key, WIDE, draw, alt, record.title, anchor)
 
 

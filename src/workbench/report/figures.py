@@ -21,7 +21,7 @@ from workbench.report.layout import SMALL, TALL, WIDE, figure_legend, legend, le
 from workbench.report.load import ErrorRow, Run, Series
 from workbench.report.plot import Plot
 from workbench.report.style import PALETTE
-from workbench.report.text import exact, pretty_unit, scientific, torque_label
+from workbench.report.text import exact, pretty_unit, scientific, torque_label, torque_name
 
 REACTIONS_DRAWN = 6
 """Reactions in one figure, the largest; the table holds them all."""
@@ -122,7 +122,7 @@ def _torque_plot(run: Run, case: str, key: str, series: Series, index: int, rows
         f"{key}-torque-{index + 1}",
         TALL,
         draw,
-        f"Case {case}, joint {joint}: force or torque in {unit} over time of {', '.join(c.label for c in curves)}; "
+        f"Case {case}: {torque_name(joint)} in {unit} over time of {', '.join(c.label for c in curves)}; "
         f"below, the error relative to the reference's peak on a logarithmic axis. Worst against its bound: "
         f"{worst.candidate} against the {worst.reference} reference, {scientific(worst.peak_error)}."
         + (" The band around the reference is what a recorded motion leaves open." if elsewhere else ""),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
-import io
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -163,11 +162,9 @@ def evaluate(context: Context, base: Robot, task: Task) -> Answer:
 
 def series_bytes(result: CaseResult) -> bytes:
     """Return the time series as they stand in ``series/<case>.parquet``; the same numbers give the same bytes."""
-    import pandas as pd  # heavy, and most sweeps keep none
+    from workbench.parquet_columns import column_bytes  # heavy, and most sweeps keep none
 
-    buffer = io.BytesIO()
-    pd.DataFrame(dict(result.series)).to_parquet(buffer, index=False, write_page_checksum=True)
-    return buffer.getvalue()
+    return column_bytes(result.series)
 
 
 def _nearest_singularity(case: Case) -> tuple[float, str]:
