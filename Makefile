@@ -66,7 +66,7 @@ test-slow: $(STAMP) ## Run only the tests marked slow
 test-long: $(STAMP) ## Run the tests that take many minutes, by hand: all bad inputs, all commands among planted files
 	$(BIN)/pytest -m long $(PYTEST_ARGS)
 
-test-browser: $(STAMP) ## Run the tests that open a report in Chromium
+test-browser: $(STAMP) ## Run the tests that open a report or the studio in Chromium
 	$(BIN)/pytest -n 2 -m browser $(PYTEST_ARGS)
 
 # The lowest versions that pyproject.toml allows, in an environment of their own, with machine code of its own; some minutes,

@@ -102,9 +102,17 @@ def test_few_figures_and_other_systems_draw_alone(tmp_path: Path, monkeypatch: p
     assert {path.name.partition("-")[2] for path in tmp_path.iterdir()} == {str(os.getpid())}
 
 
-@pytest.mark.parametrize("module", ["workbench.report.build", "workbench.compare.page"])
-def test_a_report_loads_no_engine(module: str) -> None:
-    code = f"import sys, {module}; print(*[m for m in ('mujoco', 'numba', 'scipy', 'pandas') if m in sys.modules])"
+@pytest.mark.parametrize(
+    ("module", "heavy"),
+    [
+        ("workbench.report.build", "mujoco numba scipy pandas"),
+        ("workbench.compare.page", "mujoco numba scipy pandas"),
+        ("workbench.commands.run, workbench.campaign.run, workbench.sweep.pick, workbench.report", "pandas"),
+    ],
+    ids=["a report", "a comparison", "a run"],
+)
+def test_what_is_not_used_is_not_loaded(module: str, heavy: str) -> None:
+    code = f"import sys, {module}; print(*[m for m in {heavy.split()} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
     assert done.stdout.split() == []
 

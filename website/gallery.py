@@ -12,6 +12,8 @@ Each of these is a run's own report as it was written, a page in one file. `make
 
 """
 VERDICT = re.compile(r"^\*\*[^\w*]*([A-Z ]+)\*\*: (.+)$", re.MULTILINE)
+FOUND = re.compile(r"^## Is the model enough for control\n\n(.+)$", re.MULTILINE)
+"""What a study of control says first: it finds, where other campaigns pass or fail."""
 
 
 def page(repository: Path) -> str:
@@ -25,7 +27,8 @@ def _card(path: Path, repository: Path) -> str:
     title = text.partition("\n")[0].removeprefix("# ")
     about = next(line for line in text.splitlines()[1:] if line.strip())
     verdict = VERDICT.search(text)
-    said = f"{verdict[1].capitalize()}: {verdict[2]}" if verdict else ""
+    found = FOUND.search(text)
+    said = f"{verdict[1].capitalize()}: {verdict[2]}" if verdict else f"Found: {found[1]}" if found else ""
     folder = path.parent.relative_to(repository).as_posix()
     about = re.sub(r"^Error report of the campaign \*\*\w+\*\*\. ", "", about)
     return (
