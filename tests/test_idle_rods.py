@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from workbench.errors import ModelError
+from workbench.errors import ModelError, MotionError
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
 from workbench.reference.closures import read_closures
@@ -162,3 +162,43 @@ def test_what_is_plainly_round_is_round_by_the_closer_look_too() -> None:
     assert all(close for plain, close in zip(plainly, closely, strict=True) if plain)
     assert plainly[:4] == [True] * 4
     assert closely[-2:] == [False] * 2
+
+
+def turning(joints: str) -> str:
+    """A crank that may turn all around, a rod, a rocker."""
+    return (
+        f'{HEAD}{CRANK}<body name="rod" pos=".1 0 0">{joints}<geom type="capsule" fromto="0 0 0 .4 .1 .25" size=".008"'
+        ' mass=".4"/><site name="end" pos=".4 .1 .25"/></body></body><body name="rocker" pos=".5 .1 0">'
+        '<joint name="rocker" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 .25" size=".01" mass=".8"/>'
+        f'<site name="out" pos="0 0 .25"/></body>{LOOP}'
+    )
+
+
+GIMBAL = '<joint name="x" axis="1 0 0"/><joint name="y" axis="0 1 0"/><joint name="z" axis="0 0 1"/>'
+
+
+@pytest.mark.parametrize("samples", [201, 801])
+def test_three_hinges_of_a_rod_may_turn_as_a_ball_joint_does(tmp_path: Path, samples: int) -> None:
+    """A motion that is coarse for the rod's own turn, which no loop holds, is a motion all the same; the turn stays."""
+    t = np.linspace(0.0, 2.0, samples)
+    motion = 7 * np.sin(2 * t)[:, None], 14 * np.cos(2 * t)[:, None], -28 * np.sin(2 * t)[:, None]
+    found = []
+    for joints in (BALL, GIMBAL):
+        path = tmp_path / "model.xml"
+        path.write_text(turning(joints), encoding="utf-8")
+        reference = MujocoReference(path, setup=Setup(("crank",), "out"))
+        found.append(reference.inverse_dynamics(*motion, along=t).tau)
+    assert np.abs(found[0] - found[1]).max() < 1e-11 * np.abs(found[0]).max()
+    qpos = reference.closer.close_along(motion[0]).qpos
+    hinges = np.array([reference.loaded.model.joint(name).qposadr[0] for name in "xyz"])
+    assert np.ptp(qpos[:, hinges[:2]], axis=0).max() < 1.0, "the rod spins on and on"
+
+
+def test_a_jump_of_a_joint_that_a_loop_holds_is_refused_beside_such_a_rod(tmp_path: Path) -> None:
+    path = tmp_path / "model.xml"
+    path.write_text(turning(GIMBAL), encoding="utf-8")
+    t = np.linspace(0.0, 2.0, 401)
+    q, qd, qdd = 0.7 * np.sin(2 * t)[:, None], 1.4 * np.cos(2 * t)[:, None], -2.8 * np.sin(2 * t)[:, None]
+    q[200:] += 0.3
+    with pytest.raises(MotionError, match="joint crank: jumps by"):
+        MujocoReference(path, setup=Setup(("crank",), "out")).inverse_dynamics(q, qd, qdd, along=t)

@@ -11,23 +11,23 @@ import pytest
 from rich.console import Console
 
 import workbench as wb
-from workbench import console
+from workbench import terminal
 
 
 def shown_on(monkeypatch: pytest.MonkeyPatch, terminal: bool) -> io.StringIO:
     screen = io.StringIO()
-    monkeypatch.setattr(console, "err", Console(file=screen, force_terminal=terminal, width=100))
+    monkeypatch.setattr("workbench.terminal.err", Console(file=screen, force_terminal=terminal, width=100))
     return screen
 
 
 def test_a_terminal_has_a_bar_with_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = shown_on(monkeypatch, terminal=True)
-    with console.Steps("drawing figures") as steps:
+    with terminal.Steps("drawing figures") as steps:
         steps(3, 7)
         steps._bar.refresh()
     assert "drawing figures" in screen.getvalue()
     assert "3/7" in screen.getvalue()
-    with console.CaseProgress() as cases:
+    with terminal.CaseProgress() as cases:
         cases("second [case]", 1, 4)
         cases._bar.refresh()
         cases("", 4, 4)
@@ -40,15 +40,15 @@ def test_a_terminal_has_a_bar_with_what_is_done(monkeypatch: pytest.MonkeyPatch)
 def test_elsewhere_a_line_comes_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = shown_on(monkeypatch, terminal=False)
     clock = [100.0]
-    monkeypatch.setattr(console.time, "monotonic", lambda: clock[0])
-    with console.Steps("computing the workspace") as steps:
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: clock[0])
+    with terminal.Steps("computing the workspace") as steps:
         for done in range(200):
             clock[0] += 1.0
             steps(done, 200)
     lines = screen.getvalue().splitlines()
     assert 2 <= len(lines) <= 40
     assert all("computing the workspace" in line for line in lines)
-    with console.CaseProgress() as cases:
+    with terminal.CaseProgress() as cases:
         cases("first", 0, 2)
         cases("", 2, 2)
     assert screen.getvalue().splitlines()[len(lines) :] == ["[1/2] first"]

@@ -212,7 +212,8 @@ def refuse_jumps(
     """Refuse neighbours that are farther apart than their rates and the step between them allow.
 
     Over a step h a joint with speeds v and accelerations a at both ends moves by no more than about
-    h max|v| + h^2 max|a|; `BEYOND` times that is refused. Hinges and slides, actuated ones included, are looked at.
+    h max|v| + h^2 max|a|; `BEYOND` times that is refused. Hinges and slides, actuated ones included, are looked at;
+    not the three hinges that stand for a ball joint of a rod that may turn about its own axis: no loop holds that turn.
 
     Raises
     ------
@@ -220,7 +221,8 @@ def refuse_jumps(
         Naming the sample, the joint, its change and what would be allowed.
     """
     kinds, addresses, dofs = joints
-    scalar = np.flatnonzero(kinds == SCALAR)
+    idle = _hinges_of_rods(structure, kinds)
+    scalar = np.array([j for j in range(len(kinds)) if kinds[j] == SCALAR and j not in idle], dtype=np.int64)
     if len(t) < 2 or not len(scalar):
         return
     h = np.diff(t)[:, None]
@@ -240,3 +242,9 @@ def refuse_jumps(
             value=float(change[sample, column]),
             limit=float(BEYOND * reach[sample, column]),
         )
+
+
+def _hinges_of_rods(structure: Structure, kinds: np.ndarray) -> set[int]:
+    """Joints that by threes stand for a ball joint at an end of a rod."""
+    first = [-1 - end for rod in structure.rods for end in (rod.near, rod.far) if end < 0]
+    return {joint for start in first if kinds[start] == SCALAR for joint in range(start, start + 3)}

@@ -13,6 +13,7 @@ import numpy as np
 
 from workbench.compiled import compiled, merged
 from workbench.reference.kernels import follow_tangent, integrate, keep_if_better
+from workbench.reference.kinds import SPIN
 from workbench.reference.kinematics import place
 from workbench.reference.linear import factor, solve, solved
 from workbench.reference.rows import jacobian_rows, residuals
@@ -178,11 +179,12 @@ def _on_side(mechanism, w):  # type: ignore[no-untyped-def]
 
 
 @merged
-def _follow_line(mechanism, rules, w, target, factored):  # type: ignore[no-untyped-def]
+def _follow_line(mechanism, rules, w, target, chain, factored):  # type: ignore[no-untyped-def]
     """Follow the straight line from ``Bench.ways[3]`` to *target* ``(na,)``; returns how much of it was gone, 0 to 1.
 
     ``Bench.here`` and its like are the closed configuration at the beginning, and then the last one reached;
-    *factored* says whether the last factor was taken there.
+    *factored* says whether the last factor was taken there. It serves along a *chain* only: of a lone sample the
+    tangent is wanted to rounding.
     """
     way, aim, change, origin = w.ways[0], w.ways[1], w.ways[2], w.ways[3]
     na = way.shape[0]
@@ -222,7 +224,7 @@ def _follow_line(mechanism, rules, w, target, factored):  # type: ignore[no-unty
             _copy(w.facts, w.facts_here)
             done = 1.0 if last else done + part
             step *= 2.0
-            factored = True
+            factored = chain
             if longest < rules.smallest and done < 1.0:
                 return done
         else:
@@ -234,7 +236,7 @@ def _follow_line(mechanism, rules, w, target, factored):  # type: ignore[no-unty
 
 
 @merged
-def _bend(w, target, s, size, known):  # type: ignore[no-untyped-def]
+def _bend(mechanism, w, target, s, size, known):  # type: ignore[no-untyped-def]
     """Fill `Bench.bend` for the step to sample *s*, after one of length *size* or, for NaN, none; returns its length.
 
     The change of the tangent is carried on, and by how much that missed the last *known* samples, at most three.
@@ -257,14 +259,39 @@ def _bend(w, target, s, size, known):  # type: ignore[no-untyped-def]
         elif known == 3:
             carried = 3.0 * (missed[1, d] - missed[2, d]) + missed[3, d]
         missed[4, d] = carried
-        w.bend[d] = scale * value + carried
+        w.bend[d] = scale * value
+    if known:
+        _without_spin(mechanism, w.jacobian, missed[4])
+    for d in range(w.bend.shape[0]):
+        w.bend[d] += missed[4, d]
     return longer
 
 
 @merged
-def _miss(w, known):  # type: ignore[no-untyped-def]
-    """Note by what the sample was off what was foretold, where one step led to it; returns how many are known."""
-    if w.best[2] > 1.0:
+def _without_spin(mechanism, jacobian, carried):  # type: ignore[no-untyped-def]
+    """Take out of *carried* ``(nv,)`` what turns rods about their own axes, by the *jacobian* of the last sample.
+
+    Loops do not hold a rod's turn; nothing would take back what was foretold of it, and it would grow.
+    """
+    blocks, block_rows, passive = mechanism.closures.blocks, mechanism.closures.block_rows, mechanism.passive
+    for k in range(blocks.shape[0]):
+        if blocks[k, 0] == SPIN:
+            row = block_rows[k]
+            along, square = 0.0, 0.0
+            for d in passive:
+                along += jacobian[row, d] * carried[d]
+                square += jacobian[row, d] ** 2
+            for d in passive:
+                carried[d] -= along / square * jacobian[row, d] if square > 0.0 else 0.0
+
+
+@merged
+def _miss(mechanism, w, known):  # type: ignore[no-untyped-def]
+    """Note by what the sample was off what was foretold, where one step led to it; returns how many are known.
+
+    None where loops leave a joint free: nothing would take back what was foretold of it.
+    """
+    if w.best[2] > 1.0 or w.facts_here[1] < mechanism.passive.shape[0]:
         return 0
     for d in range(w.bend.shape[0]):
         w.corrected[3, d], w.corrected[2, d] = w.corrected[2, d], w.corrected[1, d]
@@ -312,15 +339,15 @@ def advance(  # type: ignore[no-untyped-def]
                 _copy(start[s], w.ways[3])
             else:
                 _copy(target[s - 1], w.ways[3])
-                size = _bend(w, target, s, size, known)
+                size = _bend(mechanism, w, target, s, size, known)
                 _copy_rows(w.tangent_here, w.tangent_before)
-            gone = _follow_line(mechanism, rules, w, target[s], how == CHAIN and s > first)
+            gone = _follow_line(mechanism, rules, w, target[s], how == CHAIN, how == CHAIN and s > first)
             if how == LINES:
                 done[s] = gone
             elif gone < 1.0:
                 return s
             else:
-                known = _miss(w, known)
+                known = _miss(mechanism, w, known)
         _copy(w.here, qpos[s])
         _copy_rows(w.tangent_here, tangent[s])
         residual[s], rank[s] = w.facts_here[0], np.int64(w.facts_here[1])
