@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -315,7 +316,11 @@ def test_what_a_study_found_stands_in_its_report(tmp_path: Path, monkeypatch: py
     assert {path.stem for path in (out / "figures").glob("figure-control-gap-*.svg")} == {
         "figure-control-gap-rate-swing", "figure-control-gap-speed-swing",
     }  # fmt: skip
-    assert "<script" in (out / "report.html").read_text(encoding="utf-8")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "<script" in page
+    links = set(re.findall(r'href="#([^"]+)"', page))
+    assert "answer" in links
+    assert links <= set(re.findall(r'id="([^"]+)"', page)), "a link that leads nowhere"
     # the same again computes nothing; a reader of cases is told where to look
     assert run_study(*load_campaign(path), out).manifest["computed"] == 0
     with pytest.raises(OutputError, match="holds a study of 16 runs under control"):
