@@ -41,6 +41,7 @@ UNDRAWN = """(() => {
 })()"""
 """Leaves the scene's pictures empty; all else of it is there."""
 DRAWN = """() => [...document.querySelectorAll('.uplot canvas')].every(canvas => {
+  if (!canvas.width || !canvas.height) return false;
   const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
   let seen = 0;
   for (let i = 0; i < data.length; i += 4) {
