@@ -90,7 +90,7 @@ reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings i
 	    $(BIN)/workbench run campaigns/$$name.toml --quick --out $$drawn >/dev/null || exit 1; \
 	    if [ -f $$drawn/pictures/film.webp ]; then mkdir -p $$kept; cp -R $$drawn/pictures $$kept/pictures; fi; \
 	  fi; \
-	  rm -rf $$built/pictures; \
+	  rm -rf $$built; \
 	  $(BIN)/workbench run campaigns/$$name.toml --no-pictures --out $$built || exit 1; \
 	  if [ -d $$kept/pictures ]; then \
 	    cp -R $$kept/pictures $$built/pictures && $(BIN)/workbench report $$built >/dev/null || exit 1; \
