@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from inline_pool import Inline
 from small_campaign import SMALL, Workbench, listing
 from workbench.motion import JointMotion
 from workbench.report.build import build_report
@@ -61,23 +60,6 @@ rates = [200.0]
 bandwidths = [10.0]
 second_route = "none"
 """
-
-
-class Inline:
-    """Runs a study's tasks in this process; *before* is called with the number of each."""
-
-    before: Callable[[int], None] = staticmethod(lambda count: None)
-
-    def __init__(self, jobs: int, setup: Callable[[], Callable[[Any], Any]], *limits: float) -> None:
-        self._compute = setup()
-
-    def run(self, tasks: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
-        for count, (index, task) in enumerate(tasks):
-            type(self).before(count)
-            yield index, self._compute(task)
-
-    def close(self) -> None:
-        pass
 
 
 @pytest.fixture
@@ -294,3 +276,14 @@ frequency = [8.0, 17.0, 23.0]
 stop = 0.05
 samples = 21
 """
+
+
+def test_a_study_of_which_no_run_tracks_has_its_report(bench: Workbench) -> None:
+    text = STUDY.replace("bandwidths = [10.0]", "bandwidths = [400.0]").replace(
+        "rates = [200.0, 400.0]", "rates = [200.0]"
+    )
+    assert bench.run(text, "--out", "out").code == 0
+    assert json.loads((bench.directory / "out" / "control.json").read_text(encoding="utf-8"))["tracked"] == 0
+    assert len(pd.read_parquet(bench.directory / "out" / "errors.parquet")) == 0
+    build_report(bench.directory / "out", ("html", "md"))
+    assert "2 of 2 runs do not track" in (bench.directory / "out" / "report.md").read_text(encoding="utf-8")

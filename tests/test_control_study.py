@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from inline_pool import Inline
 from small_campaign import Workbench
 from workbench.campaign.control_spec import BUILT_IN, ControlClaim, ControlSpec, DelaySpec
 from workbench.campaign.run import run_campaign
@@ -271,19 +271,6 @@ def test_what_was_not_run_changes_no_verdict() -> None:
     assert verdict.varied["MuJoCo's integrator and loops"] == HOLDS
 
 
-class InThisProcess:
-    """Computes the runs of a study one after the other, without workers."""
-
-    def __init__(self, jobs: int, setup: Callable[[], Callable[[Any], Any]], *limits: float) -> None:
-        self._compute = setup()
-
-    def run(self, tasks: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
-        yield from ((index, self._compute(task)) for index, task in tasks)
-
-    def close(self) -> None:
-        pass
-
-
 CLAIM = """
 [[control.claim]]
 id = "enough"
@@ -297,7 +284,7 @@ controller = "computed torque"
 
 
 def test_what_a_study_found_stands_in_its_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("workbench.sweep.computing.Supervisor", InThisProcess)
+    monkeypatch.setattr("workbench.sweep.computing.Supervisor", Inline)
     rates = ("rates = [500.0]", "rates = [250.0, 500.0]\nspeeds = [0.5, 1.0]")
     path = write(tmp_path, rates, ("bandwidths = [10.0]", "bandwidths = [10.0, 300.0]"), more=CLAIM)
     out = tmp_path / "out"

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
 
 WIDE = 110
 """Columns of a table where there is no terminal to ask, in a log for instance."""
@@ -29,13 +29,13 @@ out = _console(stderr=False)
 err = _console(stderr=True)
 
 
-class _Bar:
-    """A progress bar on a terminal; nothing of it elsewhere."""
+class Bar:
+    """A progress bar on a terminal; nothing of it elsewhere. *last* is its last column: the time gone, if not said."""
 
-    def __init__(self, what: str) -> None:
+    def __init__(self, what: str, last: ProgressColumn | None = None) -> None:
         self._what = what
         self._bar = Progress(
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), last or TimeElapsedColumn(),
             console=err, transient=True, disable=not err.is_terminal,
         )  # fmt: skip
         self._task: Any = None
@@ -44,7 +44,7 @@ class _Bar:
         """Start the bar."""
         if err.is_terminal:
             self._bar.start()
-        self._task = self._bar.add_task(self._what, total=None)
+        self._task = self._bar.add_task(self._what, total=None, note="")
         return self
 
     def __exit__(
@@ -55,7 +55,7 @@ class _Bar:
             self._bar.stop()
 
 
-class CaseProgress(_Bar):
+class CaseProgress(Bar):
     """A progress bar on a terminal, one plain line per case elsewhere."""
 
     def __init__(self) -> None:
@@ -70,7 +70,7 @@ class CaseProgress(_Bar):
             err.print(f"[{number + 1}/{total}] {case}", markup=False)
 
 
-class Steps(_Bar):
+class Steps(Bar):
     """Steps of something that may take a while: a bar on a terminal, a line now and then elsewhere.
 
     *what* is said beside it: ``drawing figures``.

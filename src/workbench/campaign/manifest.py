@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import shlex
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +15,23 @@ from workbench.campaign.changes import Changes
 from workbench.campaign.commit import git_commit
 from workbench.campaign.spec import Campaign
 from workbench.capabilities.robot import Robot
+
+
+@dataclass(frozen=True)
+class Begun:
+    """When a run began, by the calendar and by a clock that nobody sets back."""
+
+    at: datetime = field(default_factory=lambda: datetime.now(UTC))
+    clock: float = field(default_factory=time.perf_counter)
+
+    def ended(self, command: Sequence[str]) -> dict[str, Any]:
+        """Return what the manifest says of the command, and of when it ran until now."""
+        return {
+            "command": shlex.join(command),
+            "started": self.at.isoformat(timespec="seconds"),
+            "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+            "seconds": round(time.perf_counter() - self.clock, 3),
+        }
 
 
 def shown(path: Path, campaign_file: Path) -> str:

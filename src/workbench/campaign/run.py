@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import shlex
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -23,7 +21,7 @@ from workbench.campaign.cost import cost_us
 from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.figure_spec import FigureSpec
 from workbench.campaign.lock import locked
-from workbench.campaign.manifest import describe
+from workbench.campaign.manifest import Begun, describe
 from workbench.campaign.margins import Margin, margins_of_facts
 from workbench.campaign.not_driven import NotDriven, refuse_none
 from workbench.campaign.replacing import refuse_loss, request_of
@@ -143,7 +141,7 @@ def run_campaign(
     WorkbenchError
         Bad input, in one line; then nothing was written.
     """
-    started, clock = datetime.now(UTC), time.perf_counter()
+    begun = Begun()
     campaign, file = load_campaign(path)
     model = None if model is None else Path(model)
     directory = (
@@ -212,11 +210,8 @@ def run_campaign(
         variants = [Variant(spec.name, robots[spec.name], spec.parameters) for spec in ordered]
         changes = changes_of(campaign, file, model, settings or {}, relative, variants)
         manifest = _manifest(campaign, file, cases, robots, facts, rows, changes, own) | {
-            "command": shlex.join(command),
+            **begun.ended(command),
             "request": request,
-            "started": started.isoformat(timespec="seconds"),
-            "finished": datetime.now(UTC).isoformat(timespec="seconds"),
-            "seconds": round(time.perf_counter() - clock, 3),
             "status": conclusion.status,
             "verdict": conclusion.sentence,
             "engines": list(effort.engines),

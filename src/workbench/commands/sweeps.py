@@ -6,11 +6,9 @@ import subprocess
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
 
 from rich import box
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.progress import TextColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -25,10 +23,7 @@ from workbench.sweep.estimate import estimate
 from workbench.sweep.progress import Snapshot
 from workbench.sweep.resumable import SweepOptions
 from workbench.sweep.run import SweepOutcome, run_sweep
-from workbench.terminal import err, out
-
-LINE_EVERY_S = 10.0
-"""Seconds between lines of progress where there is no terminal."""
+from workbench.terminal import LINE_EVERY_S, Bar, err, out
 
 SHOWN_DRIVERS = 6
 
@@ -59,40 +54,21 @@ def plain_line(found: Snapshot, parts: str = "cases") -> str:
     return f"[{found.done}/{found.total}] " + (", ".join([*rate, *left, *troubles]) or parts)
 
 
-class SweepProgress:
+class SweepProgress(Bar):
     """A bar with rate and time left on a terminal, a plain line now and then elsewhere."""
 
     def __init__(self, parts: str = "cases") -> None:
-        self._parts = parts
-        self._bar = Progress(
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[note]}"),
-            console=err, transient=True, disable=not err.is_terminal,
-        )  # fmt: skip
-        self._task: Any = None
+        super().__init__(parts, TextColumn("{task.fields[note]}"))
         self._said, self._last = float("-inf"), -1
-
-    def __enter__(self) -> Self:
-        """Start the bar."""
-        if err.is_terminal:
-            self._bar.start()
-        self._task = self._bar.add_task(self._parts, total=None, note="")
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Take the bar away."""
-        if err.is_terminal:  # some versions of rich end with an empty line elsewhere
-            self._bar.stop()
 
     def __call__(self, found: Snapshot) -> None:
         """Show where the sweep stands."""
         if err.is_terminal:
-            note = plain_line(found, self._parts).partition("] ")[2]
+            note = plain_line(found, self._what).partition("] ")[2]
             self._bar.update(self._task, completed=found.done, total=found.total, note=note)
         elif time.monotonic() - self._said >= LINE_EVERY_S or (found.done == found.total != self._last):
             self._said, self._last = time.monotonic(), found.done
-            err.print(plain_line(found, self._parts), markup=False)
+            err.print(plain_line(found, self._what), markup=False)
 
 
 def dry_run(

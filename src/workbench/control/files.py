@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 
-import pandas as pd
+import pyarrow as pa
 
 from workbench.campaign import store
 from workbench.control.names import CONTROL, ERROR_COLUMNS, ERRORS, LOOP_COLUMNS, RUNS
@@ -16,6 +15,11 @@ from workbench.sweep.journal import NAME as JOURNAL
 from workbench.sweep.journal import Journal
 from workbench.sweep.record import Record
 from workbench.sweep.resumable import Resumable
+
+FACTS = ("ended", "agreed", "work", "spread")
+"""Figures of a run as a whole."""
+
+NUMBERS = frozenset({"speed", "rate", "bandwidth", *FACTS, *ERROR_COLUMNS[1:]})
 
 STUDY = Resumable(
     what="study",
@@ -36,21 +40,21 @@ def write_tables(directory: Path, loops: Sequence[Loop], records: Sequence[Recor
     runs, errors = [], []
     for loop, record in zip(loops, records, strict=True):
         place = {"index": record.index, **{name: getattr(loop, name) for name in LOOP_COLUMNS}}
-        facts = {name: record.facts.get(name) for name in ("ended", "agreed", "work", "spread")}
+        facts = {name: record.facts.get(name) for name in FACTS}
         runs.append({**place, "status": record.status, "reason": record.reason, "key": record.key, **facts})
         errors += [{**place, **{name: row[name] for name in ERROR_COLUMNS}} for row in record.rows]
-    numbers = ("speed", "rate", "bandwidth", "ended", "agreed", "work", "spread", *ERROR_COLUMNS[1:])
     for name, rows, columns in (
-        (RUNS, runs, ("index", *LOOP_COLUMNS, "status", "reason", "key", "ended", "agreed", "work", "spread")),
+        (RUNS, runs, ("index", *LOOP_COLUMNS, "status", "reason", "key", *FACTS)),
         (ERRORS, errors, ("index", *LOOP_COLUMNS, *ERROR_COLUMNS)),
     ):
-        frame = pd.DataFrame(rows, columns=list(columns))
-        for column in columns:
-            if column in numbers:
-                frame[column] = frame[column].astype(float)
-        buffer = io.BytesIO()
-        frame.to_parquet(buffer, index=False)
-        files.write_bytes(directory / name, buffer.getvalue())
+        table = pa.Table.from_pylist(rows, schema=pa.schema([(column, _type_of(column)) for column in columns]))
+        files.write_bytes(directory / name, files.table_bytes(table))
+
+
+def _type_of(column: str) -> pa.DataType:
+    if column == "index":
+        return pa.int64()
+    return pa.float64() if column in NUMBERS else pa.string()
 
 
 def write_journal(directory: Path, records: Sequence[Record]) -> None:

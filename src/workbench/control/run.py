@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import shlex
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from workbench.campaign import store
 from workbench.campaign.changes import Changes, Variant, changes_of
 from workbench.campaign.conclusion import FAILED, INCOMPLETE, PASSED, Conclusion
-from workbench.campaign.manifest import describe
+from workbench.campaign.manifest import Begun, describe
 from workbench.campaign.replacing import request_of
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import full_names, load_candidates
@@ -83,7 +80,7 @@ def run_study(
     SweepInterrupted
         Ctrl-C; finished runs are kept.
     """
-    started, clock = datetime.now(UTC), time.perf_counter()
+    begun = Begun()
     options = options or SweepOptions()
     settings = dict(settings or {})
     names = full_names(candidates)
@@ -114,11 +111,8 @@ def run_study(
         changes = changes_of(campaign, file, model, settings, (), variants)
         summary = summarise(plan, records, changes)
         manifest = _manifest(plan, summary, robots[campaign.case[0].name], changes) | {
-            "command": shlex.join(command),
+            **begun.ended(command),
             "request": request,
-            "started": started.isoformat(timespec="seconds"),
-            "finished": datetime.now(UTC).isoformat(timespec="seconds"),
-            "seconds": round(time.perf_counter() - clock, 3),
             "computed": computed,
             "engines": ["mujoco"],
             "budget": plan.spec.second_route == "all",

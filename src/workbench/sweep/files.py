@@ -97,8 +97,8 @@ def write_parts(directory: Path, plan: Plan, journal: Journal) -> None:
         facts = _fact_names(plan, journal)
         for number, first in enumerate(range(0, plan.count, PART_CASES)):
             records = [journal.read(i) for i in range(first, min(first + PART_CASES, plan.count))]
-            _write_table(part(fresh[CASES], number), _case_table(plan, records, facts))
-            _write_table(part(fresh[SUMMARY], number), _summary_table(plan, records))
+            part(fresh[CASES], number).write_bytes(table_bytes(_case_table(plan, records, facts)))
+            part(fresh[SUMMARY], number).write_bytes(table_bytes(_summary_table(plan, records)))
         for name, folder in fresh.items():
             shutil.rmtree(directory / name, ignore_errors=True)
             folder.rename(directory / name)
@@ -107,11 +107,12 @@ def write_parts(directory: Path, plan: Plan, journal: Journal) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _write_table(path: Path, table: pa.Table) -> None:
-    # by way of memory: Arrow opens no file whose name is not UTF-8
-    sink = pa.BufferOutputStream()
+def table_bytes(table: pa.Table) -> bytes:
+    """Return a Parquet file whose pages carry checksums."""
+    sink = pa.BufferOutputStream()  # Arrow opens no file whose name is not UTF-8
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
-    path.write_bytes(sink.getvalue())
+    content: bytes = sink.getvalue().to_pybytes()
+    return content
 
 
 def _fact_names(plan: Plan, journal: Journal) -> list[str]:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import shlex
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +12,7 @@ from workbench.campaign.actuators import limits_of
 from workbench.campaign.changes import Variant, changes_of
 from workbench.campaign.conclusion import Conclusion
 from workbench.campaign.evidence import Effort
-from workbench.campaign.manifest import describe
+from workbench.campaign.manifest import Begun, describe
 from workbench.campaign.replacing import lost_evidence, request_of
 from workbench.campaign.spec import Campaign
 from workbench.campaign.user_candidates import full_names, load_candidates, with_rows
@@ -99,7 +96,7 @@ def run_sweep(
     SweepInterrupted
         Ctrl-C; finished cases are kept.
     """
-    started, clock = datetime.now(UTC), time.perf_counter()
+    begun = Begun()
     assert campaign.sweep is not None
     keep_series = campaign.sweep.keep_series
     effort = Effort.of_many(effort.engines, campaign.sweep.budget)
@@ -129,11 +126,8 @@ def run_sweep(
             files.write_parts(directory, plan, journal)
         summary = summarise(directory, plan, campaign)
         manifest = _manifest(campaign, file, plan, summary, model, settings or {}) | {
-            "command": shlex.join(command),
+            **begun.ended(command),
             "request": request,
-            "started": started.isoformat(timespec="seconds"),
-            "finished": datetime.now(UTC).isoformat(timespec="seconds"),
-            "seconds": round(time.perf_counter() - clock, 3),
             "computed": computed,
             "engines": list(effort.engines),
             "budget": effort.budget,
