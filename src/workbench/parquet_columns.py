@@ -21,7 +21,8 @@ def column_bytes(columns: Mapping[str, FloatArray]) -> bytes:
     """Return a Parquet file of some columns ``(n,)``, NaN as a gap; the same numbers give the same bytes."""
     table = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
     buffer = pa.BufferOutputStream()  # Arrow opens no file whose name is not UTF-8
-    pq.write_table(table, buffer, write_page_checksum=True)
+    # a dictionary of numbers that hardly repeat makes files larger and takes most of the time
+    pq.write_table(table, buffer, use_dictionary=False, write_page_checksum=True)
     content: bytes = buffer.getvalue().to_pybytes()
     return content
 

@@ -223,8 +223,9 @@ def _raw_rows(
     motion = case.motion
     name = "distributed" if "distributed" in results else next(iter(results))
     spec = CandidateSpec(name=RAW_NAME, reference=name)
-    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force, motion.t)
-    rows = _rows(case, spec, tau, results[name], evidence, felt)
+    result = results[name]
+    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force, motion.t, known=result)
+    rows = _rows(case, spec, tau, result, evidence, felt)
     return [dataclasses.replace(row, candidate=RAW_INVERSE, kind=CONTRAST) for row in rows]
 
 
