@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from workbench.campaign.evidence import Effort
     from workbench.campaign.spec import Campaign
 
-WORTH_IT = 2
+WORTH_IT = 4
 """Cases from which on a process that draws meanwhile pays: what it draws with takes a second to load."""
 
 
