@@ -84,13 +84,14 @@ def _judged(
     indices: Collection[str],
     rows: int | None,
 ) -> list[str]:
-    known = file.schema_arrow.names
+    schema = file.schema_arrow  # made anew whenever it is asked for
+    known = schema.names
     chosen = list(known if names is None else names)
     for name in chosen:
         if known.count(name) != 1:
             found = f"stands {known.count(name)} times" if name in known else "is missing"
             raise OutputError(f'{path}: column "{name[:60]}" {found}', column=name)
-        kind = file.schema_arrow.field(name).type
+        kind = schema.field(name).type
         if name in texts:
             fits, allowed = _is_text(kind.value_type if pa.types.is_dictionary(kind) else kind), "texts"
         elif name in indices:

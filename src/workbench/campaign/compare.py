@@ -154,7 +154,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for point, place in drawing.points.items():
             drawn_columns |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
-        columns, spent = spent_on(case, reference, next(iter(results)))
+        columns, spent = spent_on(case, reference, next(iter(results)), first)
         drawn_columns |= columns
         if spent:
             facts["spent"] = spent
