@@ -95,6 +95,7 @@ class Workbench:
         monkeypatch.setattr("workbench.report.build_report", lambda directory: None)
         monkeypatch.setattr("workbench.commands.sweeps.report_apart", lambda directory: None)
         monkeypatch.setattr("workbench.rendering.run_pictures.RunPictures", lambda: None)
+        monkeypatch.setattr("workbench.rendering.tracking_film.draw_tracking", lambda footage, directory: None)
 
     def write(self, text: str, name: str = "small.toml") -> str:
         """Write a file and return its name."""

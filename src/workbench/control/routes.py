@@ -53,6 +53,11 @@ class Outcome:
     """m: what half the step changes in the platform's rms error by MuJoCo's route; NaN where it was not asked"""
 
 
+def step_of(period: float, step: float | None) -> float:
+    """S, the longest step of the package's route: as asked, or the period and at most `LONGEST_STEP`."""
+    return step or min(period, LONGEST_STEP)
+
+
 def by_routes(
     plant: Plant, stiff: StiffPlant | None, run: Run, error: ErrorOf, period: float, step: float | None
 ) -> Outcome:
@@ -69,7 +74,7 @@ def by_routes(
     step
         s, longest of the plant; None is the period, at most `LONGEST_STEP`.
     """
-    own_step = step or min(period, LONGEST_STEP)
+    own_step = step_of(period, step)
     tracked = run(plant, own_step, 1)
     own = error(tracked.q, tracked.x) if tracked.status == TRACKED else None
     halved = None
