@@ -25,7 +25,7 @@ from workbench.control.loop import TRACKED, Tracked, run_loop
 from workbench.control.models import FormulaModel
 from workbench.control.names import NOT_RUN
 from workbench.control.plan import Loop, StudyPlan, case_at, delay_of, overrides_of, plan_study, torque_limits
-from workbench.control.routes import Outcome, Run, by_routes, step_of
+from workbench.control.routes import Outcome, Run, by_routes, is_halved, step_of
 from workbench.control.sampling import Desired, Sampling, as_measured, desired_at_ticks
 from workbench.control.user_controller import UserController, load_controllers
 from workbench.errors import WorkbenchError
@@ -184,8 +184,9 @@ def compute(study: Study, loop: Loop) -> Outcome:
     def error(q: FloatArray, x: FloatArray) -> Error:
         return error_of(q, desired.q, x, x_desired)
 
-    both = spec.second_route == "all"
-    return by_routes(bench.plant, bench.stiff if both else None, run, error, 1.0 / loop.rate, spec.step)
+    stiff = bench.stiff if spec.second_route == "all" else None
+    halve = is_halved(loop.rate, loop.rate_asked)
+    return by_routes(bench.plant, stiff, run, error, 1.0 / loop.rate, spec.step, halve)
 
 
 def track(study: Study, loop: Loop) -> Tracked:

@@ -257,13 +257,16 @@ def _step_left_open(run: StudyRun) -> list[str]:
     missing = sum(not is_number(error["rms_halved"]) for _, error in tracked)
     if not missing:
         return []
-    said = f"{missing} of {len(tracked)} runs were not made again at half the plant's step; above 2 kHz none are"
+    said = (
+        f"{missing} of {len(tracked)} runs were not made again at half the plant's step; above 2 kHz only those at the"
+        " rate of a printed cost are"
+    )
     if not halved:
-        return [f"{said}. What the step costs there is known by MuJoCo's route alone."]
+        return [f"{said}. What the step costs in the others is known by MuJoCo's route alone."]
     rate = max(rate for rate, _ in halved)
     most = max(abs(e["rms_halved"] / e["rms"] - 1.0) for at, e in halved if at == rate and e["rms"] > 0.0)
     return [
-        f"{said}. Steps are shorter there, and at {rate:g} Hz half of it changed no error by more than"
-        f" {100 * most:.2g} %. What it changes above is known by MuJoCo's route alone, which takes steps of the same"
-        " length in other coordinates; were both to err alike, nothing here would show it."
+        f"{said}. At {rate:g} Hz half of it changed no error by more than {100 * most:.2g} %. What it changes in the others"
+        " is known by MuJoCo's route alone, which takes steps of the same length in other coordinates; were both to err"
+        " alike, nothing here would show it."
     ]
