@@ -266,7 +266,7 @@ def _step_left_open(run: StudyRun) -> list[str]:
     rate = max(rate for rate, _ in halved)
     most = max(abs(e["rms_halved"] / e["rms"] - 1.0) for at, e in halved if at == rate and e["rms"] > 0.0)
     return [
-        f"{said}. At {rate:g} Hz half of it changed no error by more than {100 * most:.2g} %. What it changes in the others"
-        " is known by MuJoCo's route alone, which takes steps of the same length in other coordinates; were both to err"
-        " alike, nothing here would show it."
+        f"{said}. At {rate:g} Hz half of it changed no error by more than {100 * most:.2g} %. What it changes in the"
+        " others is known by MuJoCo's route alone, which takes steps of the same length in other coordinates; were both"
+        " to err alike, nothing here would show it."
     ]
