@@ -96,6 +96,7 @@ class Workbench:
         monkeypatch.setattr("workbench.commands.sweeps.report_apart", lambda directory: None)
         monkeypatch.setattr("workbench.rendering.run_pictures.RunPictures", lambda: None)
         monkeypatch.setattr("workbench.commands.run_cases.WORTH_IT", 1_000_000)
+        monkeypatch.setattr("workbench.rendering.tracking_film.draw_tracking", lambda footage, directory: None)
 
     def write(self, text: str, name: str = "small.toml") -> str:
         """Write a file and return its name."""

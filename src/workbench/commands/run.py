@@ -146,6 +146,7 @@ def run(
                 candidates=candidates or (),
                 controllers=controllers or (),
                 report=report_apart,
+                pictures=pictures,
             )
         except SweepInterrupted as stop:
             typer.echo(f"workbench: {stop}", err=True)
