@@ -27,6 +27,7 @@ from timing import Rounds, in_turn
 
 import workbench as wb
 from workbench.capabilities.robot import Robot
+from workbench.reference.engine import Evaluator
 
 FORMAT = 1
 RESULTS = Path(__file__).with_name("results")
@@ -39,10 +40,17 @@ LITERAL = {
 
 BATCHES = (1, 100, 5000, 1_000_000)
 REFERENCE_SAMPLES = 5000
+ONCE = "MuJoCo evaluating the same states once"
+MOST_ONCE = 6.0
+"""So many times what MuJoCo needs may the reference take; three were wanted (docs/speed.md says what is between)."""
 FREE = 1.8
 """A machine that gives two threads less than so many times the speed of one has no second core to spare."""
 
 IN_SMALL = "distributed, as batches of 5,000"
+
+RUN = "make run"
+MOST_RUN = 15.0
+"""s of a run of the paper's campaign with its report; six were wanted (docs/speed.md)"""
 
 SLOW_SAMPLES = 250
 """for what goes sample by sample"""
@@ -108,7 +116,7 @@ class Bench:
 def closed_forms(bench: Bench, robot: str, compiled: floor.Floor | None) -> None:
     """Batches of every size, and the papers' forms."""
     mechanism = wb.load_mechanism(model(robot))
-    constants = mechanism._constants["distributed"]
+    constants = mechanism.closed_form._constants["distributed"]
     for batch in BATCHES:
         s = smooth(robot, max(batch, 2))
         q, qd, qdd = s.q[:batch], s.qd[:batch], s.qdd[:batch]
@@ -170,7 +178,7 @@ def _one_sample(
     kernel, out, still = mechanism.kernel(), np.empty(3), np.zeros(3)
     functions: dict[str, Callable[[], object]] = {"prepared kernel": lambda: kernel(*sample, still, out)}
     if compiled:
-        constants = mechanism._constants["distributed"]
+        constants = mechanism.closed_form._constants["distributed"]
         direct = compiled.call(robot, False, constants, *sample, still, out)
 
         def by_arrays() -> None:
@@ -208,22 +216,35 @@ def _ratios(bench: Bench, robot: str, batch: int, found: Rounds) -> None:
 
 
 def reference(bench: Bench, robot: str) -> None:
-    """The reference with closure, against Pinocchio from Python and plain mj_inverse."""
+    """The reference with closure, against MuJoCo's batch, Pinocchio from Python and plain mj_inverse."""
     curve, loose = smooth(robot, REFERENCE_SAMPLES), scattered(robot, REFERENCE_SAMPLES)
     runs = {threads: wb.MujocoReference(model(robot), threads=threads) for threads in (1, 2)}
 
-    def run(s: Samples, threads: int = 1, mass_model: str = "distributed") -> Callable[[], object]:
+    times = np.linspace(0.0, 1.0, REFERENCE_SAMPLES)
+
+    def run(s: Samples, threads: int = 1, along: np.ndarray | None = None) -> Callable[[], object]:
         def call() -> object:
             runs[threads]._closed = None  # what was closed before is not to be found again
-            return runs[threads].inverse_dynamics(s.q, s.qd, s.qdd, mass_model)
+            return runs[threads].inverse_dynamics(s.q, s.qd, s.qdd, along=along)
 
         return call
 
+    closed, engine = runs[1].inverse_dynamics(curve.q, curve.qd, curve.qdd, along=times), runs[1]._engine("distributed")
+
+    def once() -> None:
+        """What the reference cannot do without: every state placed and evaluated by MuJoCo, nothing else."""
+
+        def block(evaluator: Evaluator, rows: slice) -> None:
+            evaluator.move(closed.qpos[rows], closed.qvel[rows])
+
+        engine.in_blocks(block, REFERENCE_SAMPLES)
+
     few = Samples(*(a[:: REFERENCE_SAMPLES // SLOW_SAMPLES] for a in (curve.q, curve.qd, curve.qdd)))
     functions = {
-        "reference, along a motion": run(curve),
+        "reference, along a motion": run(curve, along=times),
         "reference, scattered samples": run(loose),
-        "reference, along a motion, 2 threads": run(curve, 2),
+        "reference, along a motion, 2 threads": run(curve, 2, times),
+        ONCE: once,
     }
     plain = {"mj_inverse (wrong for closed chains)": engines.mj_inverse(robot, few)}
     other = engines.pinocchio(robot, few)
@@ -241,6 +262,9 @@ def reference(bench: Bench, robot: str) -> None:
         for name in ("reference, along a motion", "reference, scattered samples"):
             for alternative, limit in (("Pinocchio, closure included", 0.2), ("Pinocchio, configurations given", None)):
                 bench.ratio(robot, f"{name} : {alternative}", scale * scaled.ratio(name, alternative), limit)
+    bench.ratio(
+        robot, f"reference, along a motion : {ONCE}", scaled.ratio("reference, along a motion", ONCE), MOST_ONCE
+    )
     threads = scaled.ratio("reference, along a motion", "reference, along a motion, 2 threads")
     bench.ratio(robot, "reference, 1 thread : 2 threads", threads)
 
@@ -262,6 +286,14 @@ def start_up(bench: Bench) -> None:
     found = in_turn({name: call(command) for name, command in commands.items()}, 9, 20.0)
     for name in commands:
         bench.add("", name, 1, 1e6 * found.median_s(name), 1e6 * found.best_s(name), found)
+    bench.ratio("", "workbench --help, s", found.median_s("workbench --help"), 0.4)
+    bench.ratio("", "import workbench : import numpy", found.ratio("import workbench", "import numpy"), 1.0)
+    with tempfile.TemporaryDirectory() as folder:
+        campaign = str(Path(__file__).parents[1] / "campaigns" / "almeida_2010.toml")
+        run = [sys.executable, "-m", "workbench", "run", campaign, "--out", str(Path(folder) / "run")]
+        whole = in_turn({RUN: call(run)}, 3, 60.0)
+    bench.add("", RUN, 1, 1e6 * whole.median_s(RUN), 1e6 * whole.best_s(RUN), whole)
+    bench.ratio("", f"{RUN}, s", whole.median_s(RUN), MOST_RUN)
 
 
 def machine() -> dict[str, object]:

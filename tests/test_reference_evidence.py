@@ -5,6 +5,7 @@ Every check has a twin that is spoiled on purpose and must be caught.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -175,9 +176,33 @@ def test_steps_are_shortened_at_the_edge_of_the_workspace(planar: wb.MujocoRefer
     q, qd, qdd = np.array([[limb, 0.31, limb]]), np.array([[-0.003, 0.1, -0.003]]), np.zeros((1, 3))
     qpos = planar.inverse_dynamics(q, qd, qdd).qpos
     scale = power.time_scale(qd, qdd)
+    displaced = power.displaced_samples(planar, qpos, q, qd, qdd)
     with pytest.raises(MotionError):
-        power._difference(planar, qpos, q, qd, qdd, "distributed", power.FIRST_STEP * scale)
+        power._difference(displaced, np.array([0]), "distributed", power.FIRST_STEP * scale)
     assert power_balance(planar, q, qd, qdd).relative < 1e-6
+
+
+def test_what_is_known_and_shared_changes_no_bit_of_a_balance(asym: wb.MujocoReference) -> None:
+    t = np.linspace(0.1, 1.0, 260)  # of more samples than are looked at, each mass model has its own peaks
+    motion = at(SIMULATION_2)(t)
+    results = {name: asym.inverse_dynamics(*motion, name, along=t) for name in ("distributed", "lumped")}
+    displaced = power.displaced_samples(asym, results["distributed"].qpos, *motion)
+    kept = []
+    for name, result in results.items():
+        alone = power_balance(asym, *motion, name, along=t)
+        shared = power_balance(asym, *motion, name, along=t, known=result, displaced=displaced)
+        for field in dataclasses.fields(alone):
+            one, other = getattr(alone, field.name), getattr(shared, field.name)
+            assert np.array_equal(one, other), field.name
+        kept.append(shared.samples.tolist())
+    assert kept[0] != kept[1]
+    # in another order, and in parts, poses are the same too
+    some = np.array([3, 10, 11, 200])
+    other = power.displaced_samples(asym, results["lumped"].qpos, *motion)
+    other.closed(some[1:3], 1e-3)
+    whole, fresh = other.closed(some, 1e-3), power.displaced_samples(asym, results["lumped"].qpos, *motion)
+    for one, two in zip(whole.arrays, fresh.closed(some, 1e-3).arrays, strict=True):
+        assert np.array_equal(one, two)
 
 
 # forward replay
