@@ -26,7 +26,7 @@ def least_norm(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, int]:
     """y with A^T y = rhs by the compiled routines, and the rank."""
     a = matrix.copy()
     beta, perm = np.zeros(a.shape[1]), np.zeros(a.shape[1], dtype=np.int64)
-    rank = factor(a, beta, perm)
+    rank = factor(a, beta, perm, np.empty((3, a.shape[1])))
     y = np.full(a.shape[0], np.nan)
     solve_transposed(a, beta, perm, rank, rhs, y)
     return y, rank

@@ -77,6 +77,8 @@ class Bench(NamedTuple):
     a: FloatArray
     beta: FloatArray
     order: np.ndarray
+    lengths: FloatArray
+    """``(3, columns of a)`` for `workbench.reference.linear.factor`"""
     x: FloatArray
     step: FloatArray
     bend: FloatArray
@@ -104,6 +106,7 @@ def bench(mechanism: Mechanism) -> Bench:
         np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros(2, dtype=np.int64),
         np.zeros((m, nv)), np.zeros((1, m, nv)), np.zeros((1, m, nv)), np.zeros(1, dtype=np.bool_),
         np.zeros((p, p)), np.zeros(m),
-        np.zeros((m, p + na + 1)), np.zeros(p), np.zeros(p, dtype=np.int64), np.zeros(p), np.zeros(nv), np.zeros(nv),
+        np.zeros((m, p + na + 1)), np.zeros(p), np.zeros(p, dtype=np.int64), np.zeros((3, p + na + 1)), np.zeros(p),
+        np.zeros(nv), np.zeros(nv),
         np.array([0.0, math.inf, 0.0]), np.zeros((5, nv)), np.zeros((4, na)),
     )  # fmt: skip

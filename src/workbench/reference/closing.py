@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from workbench.compiled import compiled, merged
+from workbench.compiled import borrowing, merged
 from workbench.reference.kernels import follow_tangent, integrate, keep_if_better
 from workbench.reference.kinds import SPIN
 from workbench.reference.kinematics import place
@@ -34,7 +34,7 @@ ROUNDED = 1e-12
 
 
 @merged
-def _factored(passive, actuated, jacobian, residual, a, beta, order):  # type: ignore[no-untyped-def]
+def _factored(passive, actuated, jacobian, residual, a, beta, order, lengths):  # type: ignore[no-untyped-def]
     """Factor the passive columns of the Jacobian, the actuated ones and the residual along; returns the rank."""
     p, na = passive.shape[0], actuated.shape[0]
     for i in range(a.shape[0]):
@@ -43,7 +43,7 @@ def _factored(passive, actuated, jacobian, residual, a, beta, order):  # type: i
         for j in range(na):
             a[i, p + j] = -jacobian[i, actuated[j]]
         a[i, p + na] = -residual[i]
-    return factor(a, beta, order)
+    return factor(a, beta, order, lengths)
 
 
 @merged
@@ -81,7 +81,7 @@ def _rows(mechanism, w, qpos, jacobian):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@compiled
+@borrowing
 def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     """Newton on the passive joints from `Bench.qpos`, which is overwritten.
 
@@ -112,7 +112,7 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
             solve(w.a, w.beta, w.order, found, w.residual, x)
         else:
             _rows(mechanism, w, qpos, w.jacobian)
-            found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order)
+            found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order, w.lengths)
             if good:
                 _noted(passive, actuated, w.a, w.order, found, x, w.tangent, w.facts)
                 if w.sides[0] == UNKNOWN or rules.settles:  # the step to rounding does not change it
@@ -299,7 +299,7 @@ def _miss(mechanism, w, known):  # type: ignore[no-untyped-def]
     return min(known + 1, 3)
 
 
-@compiled
+@borrowing
 def advance(  # type: ignore[no-untyped-def]
     mechanism, rules, w, how, start, target, first, last, qpos, residual, tangent, rank, condition, weakest, side, done
 ):  # fmt: skip

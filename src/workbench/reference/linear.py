@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from workbench.compiled import compiled
+from workbench.compiled import borrowing
 
 RANK_TOLERANCE = 1e-10
 """A column counts as dependent when its pivot is below this fraction of the largest one."""
@@ -21,18 +21,20 @@ DIGITS_LEFT = 1e-3
 """A squared column length that fell below this fraction of what was last summed up is summed up again."""
 
 
-@compiled
-def factor(a, beta, perm):  # type: ignore[no-untyped-def]
+@borrowing
+def factor(a, beta, perm, room):  # type: ignore[no-untyped-def]
     """Factor ``a (m, p)`` in place; returns the rank. Reflectors below the diagonal, R on and above it.
 
     ``beta (p,)`` receives the reflector scales, ``perm (p,)`` the column order. Where ``a`` has more columns than
-    ``perm`` entries, those are right-hand sides b and become Q^T b, for `solved`.
+    ``perm`` entries, those are right-hand sides b and become Q^T b, for `solved`. ``room (3, columns of a)`` is
+    overwritten.
     """
     m, p, width = a.shape[0], perm.shape[0], a.shape[1]
     steps = min(m, p)
-    sums, left, known = np.empty(width), np.zeros(p), np.empty(p)
+    sums, left, known = room[0], room[1], room[2]
     for j in range(p):
         perm[j] = j
+        left[j] = 0.0
     # row by row, all columns at a time: the compiler can vectorise it, and rows where a column is zero cost nothing
     for i in range(m):
         for j in range(p):
@@ -97,7 +99,7 @@ def factor(a, beta, perm):  # type: ignore[no-untyped-def]
     return rank
 
 
-@compiled
+@borrowing
 def solved(a, perm, rank, column, x):  # type: ignore[no-untyped-def]
     """Least squares for a right-hand side that was factored along, in a column of ``a``; x ``(p,)``."""
     for j in range(perm.shape[0]):
@@ -109,7 +111,7 @@ def solved(a, perm, rank, column, x):  # type: ignore[no-untyped-def]
         x[perm[k]] = s / a[k, k]
 
 
-@compiled
+@borrowing
 def solve(a, beta, perm, rank, rhs, x):  # type: ignore[no-untyped-def]
     """Least squares ``min |A x - rhs|``; returns the residual norm. ``rhs (m,)`` is overwritten by Q^T rhs.
 
@@ -137,7 +139,7 @@ def solve(a, beta, perm, rank, rhs, x):  # type: ignore[no-untyped-def]
     return math.sqrt(residual)
 
 
-@compiled
+@borrowing
 def solve_transposed(a, beta, perm, rank, rhs, y):  # type: ignore[no-untyped-def]
     """Least-norm ``y (m,)`` with A^T y = rhs ``(p,)``."""
     m = a.shape[0]
@@ -162,6 +164,6 @@ def least_squares(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, int,
     """Solve one system with the compiled routines: solution, rank and residual norm (for tests and set-up)."""
     a = np.array(matrix, dtype=np.float64, order="C")
     beta, perm, x = np.zeros(a.shape[1]), np.zeros(a.shape[1], dtype=np.int64), np.zeros(a.shape[1])
-    rank = factor(a, beta, perm)
+    rank = factor(a, beta, perm, np.empty((3, a.shape[1])))
     residual = solve(a, beta, perm, rank, np.array(rhs, dtype=np.float64), x)
     return x, int(rank), float(residual)

@@ -35,6 +35,7 @@ def platform_newton(  # type: ignore[no-untyped-def]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
     values, rise, still = np.empty(given), np.empty(given), np.zeros(3)
     a, beta, perm, x = np.empty((m, nv)), np.empty(nv), np.empty(nv, dtype=np.int64), np.empty(nv)
+    lengths = np.empty((3, nv))
     work = np.empty((nv, nv))
     active = np.empty_like(ids)
     more = 0
@@ -53,7 +54,7 @@ def platform_newton(  # type: ignore[no-untyped-def]
         for i in range(m):
             for j in range(nv):
                 a[i, j] = jac[i, j]
-        found = factor(a, beta, perm)
+        found = factor(a, beta, perm, lengths)
         if good:
             for j in range(given):
                 for i in range(m):
@@ -94,6 +95,7 @@ def platform_accelerations(  # type: ignore[no-untyped-def]
     jac, res, rates = np.empty((m, nv)), np.empty(m), np.empty(m)
     values, rise, still = np.empty(given), np.empty(given), np.zeros(3)
     a, beta, perm, x = np.empty((m, nv)), np.empty(nv), np.empty(nv, dtype=np.int64), np.empty(nv)
+    lengths = np.empty((3, nv))
     v, acc = np.empty((nbody, 6)), np.empty((nbody, 6))
     for s in range(aim.shape[0]):
         constraint_rows(closures, joints, qpos[s], cdof[s], com[s], site_xpos[s], site_xquat[s], anchors[s], jac, res)
@@ -114,7 +116,7 @@ def platform_accelerations(  # type: ignore[no-untyped-def]
             for d in range(nv):
                 a[i, d] = jac[i, d]
         velocity_residual[s] = worst
-        rank = factor(a, beta, perm)
+        rank = factor(a, beta, perm, lengths)
         for d in range(nv):
             value = 0.0
             for j in range(given):
