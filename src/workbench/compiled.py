@@ -71,7 +71,7 @@ def borrowing(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """As `borrowing`, for a part of a kernel: it becomes one loop body with its caller, which can then be vectorised."""
+    """As `borrowing`, for a part of a kernel: it becomes one loop body with its caller, which can be vectorised."""
     return _cached(function, {"forceinline": True, **UNCOUNTED})
 
 

@@ -189,7 +189,7 @@ def _add_accelerations(kin, cdof, qacc, more, a):  # type: ignore[no-untyped-def
 
 @borrowing
 def _forces(kin, masses, xpos, xquat, v, a, per_rate, lines, frames, mass, bias):  # type: ignore[no-untyped-def]
-    """Add all bodies' inertia to ``mass (na, na)`` and ``bias (na,)``; ``lines (6, na)``, ``frames (3, 3, 3)`` are room."""
+    """Add all bodies' inertia to ``mass (na, na)``, ``bias (na,)``; room: ``lines (6, na)``, ``frames (3, 3, 3)``."""
     na = bias.shape[0]
     turn, inertia, half = frames[0], frames[1], frames[2]
     for b in range(1, masses.mass.shape[0]):

@@ -13,7 +13,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.compiled import borrowing, compiled, inlined
 from workbench.reference.kinds import BALL, CONNECT, FREE, WELD
-from workbench.reference.linear import factor, solve, solve_transposed, solved
+from workbench.reference.linear import Lengths, factor, room_to_factor, solve, solve_beside, solve_transposed
 from workbench.reference.rows import acceleration_rows, body_motion, constraint_rows, point_motion
 from workbench.reference.sides import UNKNOWN, side_of
 
@@ -104,7 +104,7 @@ def keep_if_better(res, limits, qpos, kept, best, s):  # type: ignore[no-untyped
 
 @compiled
 def newton_step(  # type: ignore[no-untyped-def]
-    ids, closures, joints, split, table, poses, limits, qpos, kept, best, tangent, rank, condition, weakest, side
+    ids, closures, joints, split, table, poses, limits, qpos, kept, best, tangent, rank, condition, weakest, side, room
 ):  # fmt: skip
     """One Newton step on the passive joints of the listed samples; returns those that need another, as a new list.
 
@@ -119,8 +119,8 @@ def newton_step(  # type: ignore[no-untyped-def]
     passive, actuated = split
     m, nv, p, na = closures.block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
-    a, beta, perm, x = np.empty((m, p)), np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
-    step, work, lengths = np.zeros(nv), np.empty((p, p)), np.empty((3, p))
+    a, beta, perm, lengths = room
+    step, work, x = np.zeros(nv), np.empty((p, p)), np.empty(p)
     active = np.empty_like(ids)
     more = 0
     for n in range(ids.shape[0]):
@@ -171,8 +171,7 @@ class ProjectionRoom(NamedTuple):
     a: FloatArray
     beta: FloatArray
     order: np.ndarray
-    lengths: FloatArray
-    x: FloatArray
+    lengths: Lengths
     force: FloatArray
     passive_force: FloatArray
     multipliers: FloatArray
@@ -187,9 +186,8 @@ def projection_room(rows: int, freedoms: int, passive: int, bodies: int) -> Proj
     """Room for a model of so many constraint rows, velocities, passive velocities and bodies."""
     m, nv, p, nb = rows, freedoms, passive, bodies
     return ProjectionRoom(
-        np.empty((m, nv)), np.empty(m), np.empty(m), np.empty((m, p + 1)), np.empty(p), np.empty(p, dtype=np.int64),
-        np.empty((3, p + 1)), np.empty(p), np.empty(nv), np.empty(p), np.empty(m), np.empty((nb, 6)),
-        np.empty((nb, 6)), np.empty((nb, 3)),
+        np.empty((m, nv)), np.empty(m), np.empty(m), *room_to_factor(m, p, 1), np.empty(nv), np.empty(p), np.empty(m),
+        np.empty((nb, 6)), np.empty((nb, 6)), np.empty((nb, 3)),
     )  # fmt: skip
 
 
@@ -216,9 +214,8 @@ def projection(  # type: ignore[no-untyped-def]
     blocks, block_rows = closures.blocks, closures.block_rows
     root, moving, depth = closures.root, closures.moving, closures.depth
     m, nv, p, na = block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
-    jac, res, rates, a, beta, perm, lengths, x = (
-        room.jacobian, room.residual, room.rates, room.a, room.beta, room.order, room.lengths, room.x
-    )  # fmt: skip
+    jac, res, rates = room.jacobian, room.residual, room.rates
+    a, beta, perm, lengths = room.a, room.beta, room.order, room.lengths
     force, passive_force, multipliers = room.force, room.passive_force, room.multipliers
     v, acc, carried = room.velocity, room.acceleration, room.carried
     for s in range(qpos.shape[0]):
@@ -240,9 +237,9 @@ def projection(  # type: ignore[no-untyped-def]
             for j in range(p):
                 a[i, j] = jac[i, passive[j]]
         rank = factor(a, beta, perm, lengths)
-        solved(a, perm, rank, p, x)
-        for j in range(p):
-            qacc[s, passive[j]] += x[j]
+        solve_beside(a, p, rank)
+        for k in range(p):
+            qacc[s, passive[perm[k]]] += a[k, p]
         body_motion(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], v, acc)
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
         worst = 0.0

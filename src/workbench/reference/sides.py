@@ -19,7 +19,7 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.compiled import borrowing, inlined
 from workbench.reference.kinds import CONNECT, JOINT, SPIN, TENDON, WELD
-from workbench.reference.linear import factor
+from workbench.reference.linear import factor, room_to_factor
 from workbench.reference.structure import IntArray, Structure
 
 UNKNOWN = -1
@@ -209,8 +209,9 @@ def _starts(parts: list[np.ndarray]) -> IntArray:
 def side_at(jacobian: FloatArray, columns: IntArray, table: SideTable) -> int:
     """Side of one configuration with rows ``(m, nv)``, of which *columns* are solved for."""
     p = len(columns)
-    a, order, room = np.ascontiguousarray(jacobian[:, columns]), np.empty(p, dtype=np.int64), np.empty((3, p))
-    rank = factor(a, np.empty(p), order, room)
+    a, *room = room_to_factor(len(jacobian), p)
+    a[: len(jacobian), :p] = jacobian[:, columns]
+    rank = factor(a, *room)
     return int(side_of(jacobian, rank, table, np.empty((p, p))))
 
 
