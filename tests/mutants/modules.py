@@ -110,16 +110,35 @@ UNCOMPILED_TESTS: dict[str, tuple[str, ...]] = {
     "reference/linear": ("reference_linear", "closure_kinds"),
     "reference/platform_": ("task_coordinates",),
     "reference/sides": ("sides",),
-    "reference/task_rows": ("task_coordinates",),
+    "reference/task_rows": ("seen_from_the_base", "task_coordinates"),
     "reference/": LOOPS,
 }  # fmt: skip
 """The same for the reference's kernels, which are left uncompiled."""
+
+LONGER_TESTS: dict[str, tuple[str, ...]] = {
+    "reference/forward": ("control_plant", "control_routes"),
+    "reference/pinocchio": (),
+    "reference/platform_": ("task_coordinates", "platform_side"),
+    "reference/stiff_plant": ("control_routes", "control_plant"),
+    "reference/survey": (),
+    "reference/task": ("seen_from_the_base", "task_coordinates", "platform_side"),
+    "reference/": ("compiled_closure", "reference_closure", "motion_along", "reference_linear", "counted_forces"),
+}  # fmt: skip
+"""Test files that what survives a short run has to survive as well, compiled and however long a test takes."""
 
 
 def short_tests(module: str) -> list[str]:
     """Test files of a short run."""
     table = UNCOMPILED_TESTS if is_kernel(module) and module.startswith("reference/") else SHORT_TESTS
     return [test_file(name) for name in next(tests for start, tests in table.items() if module.startswith(start))]
+
+
+def longer_tests(module: str) -> list[str]:
+    """Test files for what survives those of a short run; none but for the reference."""
+    for start, tests in LONGER_TESTS.items():
+        if module.startswith(start):
+            return list(dict.fromkeys([*map(test_file, tests), *short_tests(module)]))
+    return []
 
 
 def files_of(group: str) -> list[str]:
