@@ -24,8 +24,9 @@ CORE_TESTS = (
     "mjcf_assumptions", "mjcf_edit", "mjcf_roundtrip",
     "mjcf_safety", "mjcf_setup", "mjcf_source", "model_command", "models", "motion_along", "motion_platform",
     "negative_controls", "own_campaign", "own_reference", "pinocchio_reference", "planar_4rprp", "planar_4rprp_model",
-    "platform_side", "random_robots", "reactions", "recorded", "reference_closure", "reference_dynamics",
-    "reference_evidence", "reference_linear", "refusals", "robot_file", "robot_folder", "screws",
+    "plant_terms", "platform_side", "random_robots", "reactions", "recorded", "reference_closure",
+    "reference_dynamics", "reference_evidence", "reference_linear", "reference_thresholds", "refusals",
+    "robot_file", "robot_folder", "screws",
     "second_engine_campaigns", "sides", "speed_semantics", "task_coordinates", "terms", "tolerances", "urdf",
     "user_kinematics", "verdict",
 )  # fmt: skip
@@ -46,7 +47,7 @@ KERNEL_TESTS: dict[str, tuple[str, ...]] = {
 INTERPRETED_TESTS = ("reference_linear", "closure_kinds", "own_reference", "reactions", "idle_rods", "task_coordinates")
 """Small enough to run with all kernels uncompiled."""
 
-LOOPS = ("closure_kinds", "own_reference", "idle_rods", "reactions")
+LOOPS = ("closure_kinds", "own_reference", "idle_rods", "reactions", "reference_thresholds")
 """Tests of all that closes loops; they take seconds, also uncompiled."""
 
 SHORT_TESTS: dict[str, tuple[str, ...]] = {
@@ -81,11 +82,11 @@ SHORT_TESTS: dict[str, tuple[str, ...]] = {
     "reference/body_": ("terms", "counted_forces"),
     "reference/check": ("mjcf_assumptions", "own_reference"),
     "reference/continuation": ("closure_kinds", "reference_closure", "motion_along"),
-    "reference/crossings": ("importing",),
-    "reference/forward": ("control_plant",),
+    "reference/crossings": ("reference_thresholds", "importing"),
+    "reference/forward": ("plant_terms", "control_routes"),
     "reference/left_o": ("refusals", "importing", "tolerances", "idle_rods"),
     "reference/linear": ("reference_linear", "closure_kinds"),
-    "reference/pinocchio": ("pinocchio_reference", "sides", "second_engine_campaigns"),
+    "reference/pinocchio": ("reference_thresholds", "pinocchio_reference", "sides", "second_engine_campaigns"),
     "reference/platform_": ("task_coordinates", "platform_side"),
     "reference/power": ("reference_evidence", "counted_forces"),
     "reference/regressor": ("terms",),
@@ -106,7 +107,7 @@ SHORT_TESTS: dict[str, tuple[str, ...]] = {
 """Beginnings of names of files, the first that fits: the test files of a short run, which looks at no map of lines."""
 
 UNCOMPILED_TESTS: dict[str, tuple[str, ...]] = {
-    "reference/forward": ("control_plant",),
+    "reference/forward": ("plant_terms",),
     "reference/linear": ("reference_linear", "closure_kinds"),
     "reference/platform_": ("task_coordinates",),
     "reference/sides": ("sides",),
