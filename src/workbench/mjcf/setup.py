@@ -158,7 +158,7 @@ def _motor(spec: mujoco.MjSpec, joint: str) -> None:
     for limits in ("ctrlrange", "forcerange", "actrange", "lengthrange", "velrange", "ffrange"):
         setattr(motor, limits, [0.0, 0.0])
     motor.armature, motor.damping, motor.delay, motor.nsample = 0.0, [0.0] * 3, 0.0, 0
-    motor.cranklength, motor.inheritrange, motor.actearly, motor.group = 0.0, 0.0, False, 0
+    motor.inheritrange, motor.actearly, motor.group = 0.0, False, 0
 
 
 def plan(model: mujoco.MjModel, file: str, setup: Setup) -> Preparation:
