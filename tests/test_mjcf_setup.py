@@ -223,7 +223,8 @@ def with_tendon() -> Prepared:
 
 
 COMPARED = (
-    *BODIES, *GEOMS, *SITES, *JOINTS, "dof_frictionloss", "qpos0", "qpos_spring", *TENDONS, *EQUALITIES, *PLAIN_ACTUATOR,
+    *BODIES, *GEOMS, *SITES, *JOINTS, "dof_frictionloss", "qpos0", "qpos_spring", *TENDONS, *EQUALITIES,
+    *PLAIN_ACTUATOR,
 )  # fmt: skip
 
 

@@ -146,7 +146,7 @@ class Preparation:
 
 
 def _motor(spec: mujoco.MjSpec, joint: str) -> None:
-    """Add a motor of which nothing is left to the file's defaults."""
+    """Add a motor; nothing that acts on a joint is left to the defaults of the file."""
     limited = mujoco.mjtLimited.mjLIMITED_FALSE
     motor = spec.add_actuator()
     motor.set_to_motor()
