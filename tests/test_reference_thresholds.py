@@ -14,12 +14,13 @@ import pytest
 
 from own_mechanisms import FOURBAR
 from test_mjcf_setup import robot
-from workbench.errors import ModelError, MotionError
+from workbench.errors import ModelError, MotionError, ParameterError
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference, crossings
 from workbench.reference.freedoms import NEARBY, check_freedoms
 from workbench.reference.left_out import Touch
 from workbench.reference.pinocchio_reference import PinocchioReference
+from workbench.reference.platform_closure import PlatformCloser
 from workbench.reference.redundant import excess_actuators, left_null_space
 
 WITHIN, BEYOND = 0.3, 3.0
@@ -127,3 +128,30 @@ def test_where_branches_meet_a_pose_on_either_side_tells(side: float) -> None:
     with pytest.raises(ModelError, match=r"1 freedom\(s\) that no actuator holds.*joint \"wrist\" by 1 can still move"):
         check_freedoms(structure, home, lambda way: home, 1e-9)
     check_freedoms(structure, held, reclose, 1e-9)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_coordinates_that_fail_at_home_alone_are_told_by_a_pose_on_either_side(side: float) -> None:
+    def closer(determined: bool) -> Any:
+        def rank(loops: Any, qpos: np.ndarray) -> int:
+            return int(determined and side * qpos[0] > 0.0)
+
+        return SimpleNamespace(
+            task=SimpleNamespace(names=("rx",), turn_columns=np.array([0])),
+            leading=np.array([0]),
+            structure=SimpleNamespace(file="model.xml", actuated_qpos=np.array([0])),
+            home=np.zeros(1),
+            _rank=rank,
+            _has=lambda loops: ["x", "rx"],
+        )
+
+    def close(target: np.ndarray) -> Any:
+        if side * target[0, 0] < 0.0:
+            raise MotionError("the loops cannot be closed there")
+        return SimpleNamespace(qpos=target)
+
+    loops: Any = SimpleNamespace(close=close)
+    with pytest.raises(ModelError, match="the home pose is a singular one: there rx do not determine the joints"):
+        PlatformCloser._refuse_dependent(closer(True), loops, np.zeros((1, 1)))
+    with pytest.raises(ParameterError, match="of task coordinates rx only 0 can be chosen"):
+        PlatformCloser._refuse_dependent(closer(False), loops, np.zeros((1, 1)))

@@ -26,7 +26,7 @@ CORE_TESTS = (
     "negative_controls", "own_campaign", "own_reference", "pinocchio_reference", "planar_4rprp", "planar_4rprp_model",
     "plant_terms", "platform_side", "random_robots", "reactions", "recorded", "reference_closure",
     "reference_dynamics", "reference_evidence", "reference_linear", "reference_thresholds", "refusals",
-    "robot_file", "robot_folder", "screws",
+    "robot_file", "robot_folder", "screws", "shelf",
     "second_engine_campaigns", "sides", "speed_semantics", "task_coordinates", "terms", "tolerances", "urdf",
     "user_kinematics", "verdict",
 )  # fmt: skip
@@ -94,7 +94,7 @@ SHORT_TESTS: dict[str, tuple[str, ...]] = {
     "reference/regressor": ("terms",),
     "reference/replay": ("counted_forces", "reference_evidence"),
     "reference/rods": ("idle_rods", "reference_closure"),
-    "reference/shelf": ("variants",),
+    "reference/shelf": ("shelf", "variants"),
     "reference/sides": ("sides",),
     "reference/skeleton": ("report_skeleton",),
     "reference/stiff_plant": ("control_plant",),
