@@ -25,7 +25,7 @@ from workbench.reference.closure import LoopCloser
 from workbench.reference.continuation import Assembly
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
 from workbench.reference.freedoms import check_freedoms, refuse_locked
-from workbench.reference.kernels import projection, velocities
+from workbench.reference.kernels import projection, projection_room, velocities
 from workbench.reference.platform_closure import PlatformCloser
 from workbench.reference.platform_side import PlatformSide
 from workbench.reference.reactions import named, reaction_rows
@@ -281,6 +281,7 @@ class MujocoReference(PlatformSide):
                 force[rows], qacc[rows], tau[rows], closure_residual[rows], velocity_residual[rows],
                 acceleration_residual[rows], motion[:, rows], (turning[0][rows], turning[1][rows], turning[2][rows]),
                 reactions[:, rows], slack[rows],
+                projection_room(structure.rows, model.nv, len(structure.passive), model.nbody),
             )  # fmt: skip
             energy[rows] = dynamics.energy[: rows.stop - rows.start]
 

@@ -57,8 +57,8 @@ STALLED = 0.5
 LOST = 10.0
 """Strokes; an error beyond is no tracking error any more."""
 
-LOOP_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""Near-rigid loop closures, with solref "2h 1" for step h; stiffer direct values diverge."""
+IMPEDANCE = (0.9999, 0.9999)
+"""Near-rigid loop closures, at any distance, with solref "2h 1" for step h; stiffer direct values diverge."""
 
 SILENT, PULLING = 30, 29
 """Groups of actuators: the file's own, which are switched off, and the one that stands for an external force."""
@@ -330,11 +330,11 @@ def near_rigid(spec: mujoco.MjSpec, step: float, pull: tuple[str, FloatArray] | 
         _pull_at(spec, *pull)
     for equality in spec.equalities:
         equality.solref = [2.0 * step, 1.0]
-        equality.solimp = list(LOOP_SOLIMP)
+        equality.solimp[:2] = IMPEDANCE
     # dry friction is a constraint too; with its soft defaults joints would creep
     for rubbing in (*spec.joints, *spec.tendons):
         rubbing.solref_friction = [2.0 * step, 1.0]
-        rubbing.solimp_friction = list(LOOP_SOLIMP)
+        rubbing.solimp_friction[:2] = IMPEDANCE
     return spec.compile()
 
 
