@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.campaign import store
+from workbench.campaign.cases import Case
 from workbench.campaign.compare import RAW_DESCRIPTION, RAW_INVERSE, Row
 from workbench.campaign.spec import Campaign
-from workbench.capabilities.robot import Robot
 
 
 class CaseDrawing(Protocol):
@@ -23,14 +23,14 @@ class CaseDrawing(Protocol):
 
 
 def case_to_draw(
-    campaign: Campaign, robot: Robot, names: Sequence[str], facts: Mapping[str, Any], rows: Sequence[Row], stage: Path
+    campaign: Campaign, case: Case, names: Sequence[str], facts: Mapping[str, Any], rows: Sequence[Row], stage: Path
 ) -> dict[str, Any]:
     """Return what a report will find of one case: the part of the manifest that figures need, and rows of the summary.
 
     *names* are all cases that the manifest will hold, in order, since a figure's key depends on them; *facts* are the
     case's own, and *stage* is the directory that holds its series.
     """
-    name = rows[0].case if rows else ""
+    name, robot = case.name, case.robot
     candidates = {one.name: {"mass_model": robot.candidates[one.name].mass_model} for one in campaign.candidate}
     if any(row.candidate == RAW_INVERSE for row in rows):
         candidates[RAW_INVERSE] = {"mass_model": RAW_DESCRIPTION["mass_model"]}

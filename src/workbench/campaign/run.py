@@ -201,7 +201,7 @@ def run_campaign(
             results.append(result)
             store.write_series(stage, case.name, result.series)
             if drawing:
-                drawing.case(case_to_draw(campaign, case.robot, names, _judged(result), result.rows, stage))
+                drawing.case(case_to_draw(campaign, case, names, _judged(result), result.rows, stage))
             if pictures and len(results) == 1:
                 pictures.start(result)
         if progress:
