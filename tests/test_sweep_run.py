@@ -603,6 +603,7 @@ def test_one_case_of_a_sweep_by_itself_has_the_same_numbers_and_all_evidence(wor
     assert workbench("run", name, "--out", "run", "--jobs", "1").code == 0
     errors = pd.read_parquet(workbench.directory / "run" / "summary")
     case = errors[errors["kind"] == "modelling"].sort_values("peak_error")["case"].iloc[-1]
+    workbench.gather_evidence()
     done = workbench("run", name, "--only", case)
     assert done.code == 0, done
     directory = workbench.directory / "reports" / "sweep-cases"
