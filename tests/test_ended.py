@@ -23,7 +23,7 @@ pytestmark = [
     pytest.mark.usefixtures("warm_kernels"),
 ]
 
-LONG = SMALL.replace("samples = 21", "samples = 60000")
+LONG = SMALL.replace("samples = 21", "samples = 12000")
 
 
 @contextlib.contextmanager
