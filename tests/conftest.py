@@ -31,6 +31,14 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Plot, "drawn", lambda plot, size: svg_of(new_figure(*size), plot.key))
 
 
+@pytest.fixture
+def inline_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sweeps and studies compute in this process: a worker takes seconds to start, and is the subject of few tests."""
+    from inline_pool import Inline
+
+    monkeypatch.setattr("workbench.sweep.computing.Supervisor", Inline)
+
+
 @pytest.fixture(scope="session")
 def warm_kernels(repository: Path) -> None:
     """Both robots' kernels compiled and kept: a first use says so on stderr, where some tests look at every line."""
