@@ -100,6 +100,8 @@ class Workbench:
         monkeypatch.setattr("workbench.report.build_report", lambda directory: None)
         monkeypatch.setattr("workbench.commands.sweeps.report_apart", lambda directory: None)
         monkeypatch.setattr("workbench.rendering.run_pictures.RunPictures", lambda: None)
+        monkeypatch.setattr("workbench.commands.run_cases.WORTH_IT", 1_000_000)
+        monkeypatch.setattr("workbench.rendering.tracking_film.draw_tracking", lambda footage, directory: None)
         self._effort = run_command._effort
         monkeypatch.setattr(run_command, "_effort", lambda engines, quick: self._effort(engines, True))
 
