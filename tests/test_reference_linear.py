@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workbench.reference.kernels import keep_if_better
-from workbench.reference.linear import factor, least_squares, solve_transposed
+from workbench.reference.linear import factor, least_squares, room_to_factor, solve_beside, solve_transposed
 
 TOLERANCE = 1e-11  # rounding of a factor with condition number up to about 100
 
@@ -24,10 +24,10 @@ def matrix_of_rank(rows: int, columns: int, rank: int, rng: np.random.Generator)
 
 def least_norm(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, int]:
     """y with A^T y = rhs by the compiled routines, and the rank."""
-    a = matrix.copy()
-    beta, perm = np.zeros(a.shape[1]), np.zeros(a.shape[1], dtype=np.int64)
-    rank = factor(a, beta, perm)
-    y = np.full(a.shape[0], np.nan)
+    a, beta, perm, lengths = room_to_factor(*matrix.shape)
+    a[: len(matrix), : matrix.shape[1]] = matrix
+    rank = factor(a, beta, perm, lengths)
+    y = np.full(len(matrix), np.nan)
     solve_transposed(a, beta, perm, rank, rhs, y)
     return y, rank
 
@@ -61,6 +61,26 @@ def test_transposed_solution_is_the_least_norm_one(shape: tuple[int, int, int, i
     best = np.linalg.pinv(a.T, rcond=1e-8) @ rhs
     assert found == rank
     assert np.abs(y - best).max() <= TOLERANCE * max(1.0, float(np.abs(best).max()))
+
+
+@given(shapes, st.integers(1, 6))
+def test_right_hand_sides_factored_along_are_solved_as_one_by_one(shape: tuple[int, int, int, int], count: int) -> None:
+    rows, columns, rank, seed = shape
+    rank = min(rank, rows, columns)
+    rng = np.random.default_rng(seed)
+    matrix, sides = matrix_of_rank(rows, columns, rank, rng), rng.normal(size=(rows, count))
+    a, beta, perm, lengths = room_to_factor(rows, columns, count)
+    a[:rows, :columns], a[:rows, columns : columns + count] = matrix, sides
+    found = factor(a, beta, perm, lengths)
+    solve_beside(a, columns, found)
+    x = np.zeros((columns, count))
+    x[perm] = a[:columns, columns : columns + count]
+    alone = np.transpose([least_squares(matrix, side)[0] for side in sides.T])
+    scale = max(1.0, float(np.abs(alone).max()))
+    assert found == rank
+    assert np.abs(x - alone).max() <= TOLERANCE * scale
+    assert np.abs(matrix.T @ (matrix @ x - sides)).max() <= TOLERANCE * max(1.0, np.abs(matrix).max()) * 100
+    assert not a[:, columns + count :].any()  # what fills up the fours stays zero
 
 
 @given(st.integers(0, 2**32 - 1))

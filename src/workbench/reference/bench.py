@@ -9,6 +9,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.reference.kinematics import Kinematics, Places, room
+from workbench.reference.linear import Lengths, room_to_factor
 from workbench.reference.sides import NO_SIDES, SideTable
 from workbench.reference.tables import ClosureTables
 
@@ -75,8 +76,10 @@ class Bench(NamedTuple):
     work: FloatArray
     residual: FloatArray
     a: FloatArray
+    """``(m, .)`` passive columns of the Jacobian, actuated ones, the residual: what was factored last"""
     beta: FloatArray
     order: np.ndarray
+    lengths: Lengths
     x: FloatArray
     step: FloatArray
     bend: FloatArray
@@ -103,7 +106,6 @@ def bench(mechanism: Mechanism) -> Bench:
         places, seen, np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros((nv, na)),
         np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros(2, dtype=np.int64),
         np.zeros((m, nv)), np.zeros((1, m, nv)), np.zeros((1, m, nv)), np.zeros(1, dtype=np.bool_),
-        np.zeros((p, p)), np.zeros(m),
-        np.zeros((m, p + na + 1)), np.zeros(p), np.zeros(p, dtype=np.int64), np.zeros(p), np.zeros(nv), np.zeros(nv),
+        np.zeros((p, p)), np.zeros(m), *room_to_factor(m, p, na + 1), np.zeros(p), np.zeros(nv), np.zeros(nv),
         np.array([0.0, math.inf, 0.0]), np.zeros((5, nv)), np.zeros((4, na)),
     )  # fmt: skip

@@ -11,11 +11,11 @@ import math
 
 import numpy as np
 
-from workbench.compiled import compiled, merged
+from workbench.compiled import borrowing, merged
 from workbench.reference.kernels import follow_tangent, integrate, keep_if_better
 from workbench.reference.kinds import SPIN
 from workbench.reference.kinematics import place
-from workbench.reference.linear import factor, solve, solved
+from workbench.reference.linear import factor, solve, solve_beside
 from workbench.reference.rows import jacobian_rows, residuals
 from workbench.reference.sides import UNKNOWN, same_side, side_of
 
@@ -34,27 +34,30 @@ ROUNDED = 1e-12
 
 
 @merged
-def _factored(passive, actuated, jacobian, residual, a, beta, order):  # type: ignore[no-untyped-def]
-    """Factor the passive columns of the Jacobian, the actuated ones and the residual along; returns the rank."""
+def _factored(passive, actuated, jacobian, residual, a, beta, order, lengths):  # type: ignore[no-untyped-def]
+    """Factor the passive columns of the Jacobian, solve for the actuated ones and the residual; returns the rank."""
     p, na = passive.shape[0], actuated.shape[0]
-    for i in range(a.shape[0]):
+    for i in range(jacobian.shape[0]):
         for j in range(p):
             a[i, j] = jacobian[i, passive[j]]
         for j in range(na):
             a[i, p + j] = -jacobian[i, actuated[j]]
         a[i, p + na] = -residual[i]
-    return factor(a, beta, order)
+    rank = factor(a, beta, order, lengths)
+    solve_beside(a, p, rank)
+    return rank
 
 
 @merged
-def _noted(passive, actuated, a, order, found, x, tangent, facts):  # type: ignore[no-untyped-def]
+def _noted(passive, actuated, a, order, found, tangent, facts):  # type: ignore[no-untyped-def]
     """Velocities per actuated velocity, rank, condition and weakest freedom, from the last factor."""
     p, na = passive.shape[0], actuated.shape[0]
-    for j in range(na):
-        solved(a, order, found, p + j, x)
-        for k in range(p):
-            tangent[passive[k], j] = x[k]
-        for k in range(na):
+    for k in range(p):
+        d = passive[order[k]]
+        for j in range(na):
+            tangent[d, j] = a[k, p + j]
+    for k in range(na):
+        for j in range(na):
             tangent[actuated[k], j] = 1.0 if k == j else 0.0
     facts[1] = found
     if p == 0:  # an open chain: nothing to solve for
@@ -81,7 +84,7 @@ def _rows(mechanism, w, qpos, jacobian):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@compiled
+@borrowing
 def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     """Newton on the passive joints from `Bench.qpos`, which is overwritten.
 
@@ -112,14 +115,15 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
             solve(w.a, w.beta, w.order, found, w.residual, x)
         else:
             _rows(mechanism, w, qpos, w.jacobian)
-            found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order)
+            found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order, w.lengths)
             if good:
-                _noted(passive, actuated, w.a, w.order, found, x, w.tangent, w.facts)
+                _noted(passive, actuated, w.a, w.order, found, w.tangent, w.facts)
                 if w.sides[0] == UNKNOWN or rules.settles:  # the step to rounding does not change it
                     w.sides[0] = side_of(w.jacobian, found, mechanism.sides, w.work)
             if not again:
                 break
-            solved(w.a, w.order, found, w.a.shape[1] - 1, x)
+            for k in range(passive.shape[0]):
+                x[w.order[k]] = w.a[k, passive.shape[0] + actuated.shape[0]]
         longest = 0.0
         for j in range(passive.shape[0]):
             step[passive[j]] = x[j]
@@ -299,7 +303,7 @@ def _miss(mechanism, w, known):  # type: ignore[no-untyped-def]
     return min(known + 1, 3)
 
 
-@compiled
+@borrowing
 def advance(  # type: ignore[no-untyped-def]
     mechanism, rules, w, how, start, target, first, last, qpos, residual, tangent, rank, condition, weakest, side, done
 ):  # fmt: skip

@@ -19,6 +19,7 @@ from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import integrate, newton_step
 from workbench.reference.kinds import JOINT, TENDON
 from workbench.reference.kinematics import is_covered, kinematics_of
+from workbench.reference.linear import room_to_factor
 from workbench.reference.rows import constraint_rows
 from workbench.reference.sides import pattern_of
 from workbench.reference.structure import Structure
@@ -180,18 +181,19 @@ class LoopCloser(OrderedClosure):
         start[:, self.structure.actuated_qpos] = aim
         found = self._nothing(count, aim.shape[1])
         if self.mechanism is not None:
-            room = bench(self.mechanism)
-            advance(self.mechanism, self.rules(), room, NEAR, start, start, 0, count, *found.arrays, np.zeros(0))
+            work = bench(self.mechanism)
+            advance(self.mechanism, self.rules(), work, NEAR, start, start, 0, count, *found.arrays, np.zeros(0))
             return found
         qpos = evaluator.qpos
         qpos[:count] = start
-        limits = self.limits
+        limits, room = self.limits, room_to_factor(self.structure.rows, len(self.structure.passive))
         active = np.arange(count)
         for _ in range(NEWTON_STEPS):
             poses = evaluator.place(active)
             active = newton_step(
                 active, self.tables.closures, self.joints, self.tables.split, self._side_table, poses.tables, limits,
                 qpos, found.qpos, found.residual, found.tangent, found.rank, found.condition, found.weakest, found.side,
+                room,
             )  # fmt: skip
             if not len(active):
                 break

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.compiled import compiled, merged, types
+from workbench.compiled import borrowing, compiled, merged, types
 from workbench.reference.bench import Mechanism
 from workbench.reference.closing import _copy, _copy_rows, _on_side, close_one
 from workbench.reference.kernels import follow_tangent, integrate
@@ -96,6 +96,8 @@ class Room(NamedTuple):
     """``(na, na)``"""
     linear: FloatArray
     """``(6, na)``"""
+    frames: FloatArray
+    """``(3, 3, 3)``"""
 
 
 @structref.register
@@ -124,10 +126,11 @@ def room_for(mechanism: Mechanism) -> Room:
         np.zeros(na), np.zeros(na), np.zeros(na), np.zeros((na, na)), np.zeros(na), np.zeros(nv), np.zeros(nv),
         np.zeros(nv), np.zeros(p), np.zeros(m), np.zeros((nb, 6)), np.zeros((nb, 6)), np.zeros((nb, 6)),
         np.zeros((nb, 6, na)), np.zeros((5, na)), np.zeros(3), np.zeros((na, na)), np.zeros((6, na)),
+        np.zeros((3, 3, 3)),
     )  # fmt: skip
 
 
-@compiled
+@borrowing
 def _motions(kin, cdof, qvel, qacc, tangent, v, a, per_rate):  # type: ignore[no-untyped-def]
     """Spatial velocities, accelerations, and velocities per actuated velocity of all bodies, about fixed points."""
     na = tangent.shape[1]
@@ -184,16 +187,14 @@ def _add_accelerations(kin, cdof, qacc, more, a):  # type: ignore[no-untyped-def
             a[b, i] += more[b, i]
 
 
-@compiled
-def _forces(kin, masses, xpos, xquat, v, a, per_rate, lines, mass, bias):  # type: ignore[no-untyped-def]
-    """Add all bodies' inertia to ``mass (na, na)`` and ``bias (na,)``; ``lines (6, na)`` is room."""
+@borrowing
+def _forces(kin, masses, xpos, xquat, v, a, per_rate, lines, frames, mass, bias):  # type: ignore[no-untyped-def]
+    """Add all bodies' inertia to ``mass (na, na)``, ``bias (na,)``; room: ``lines (6, na)``, ``frames (3, 3, 3)``."""
     na = bias.shape[0]
-    turn = np.empty((3, 3))
-    inertia, half = np.empty((3, 3)), np.empty((3, 3))
-    point = np.empty(3)
+    turn, inertia, half = frames[0], frames[1], frames[2]
     for b in range(1, masses.mass.shape[0]):
         x, y, z = _turned(xquat[b], masses.centre[b])
-        point[0], point[1], point[2] = xpos[b, 0] + x, xpos[b, 1] + y, xpos[b, 2] + z
+        point = xpos[b, 0] + x, xpos[b, 1] + y, xpos[b, 2] + z
         rx, ry, rz = point[0] - kin.centre[b, 0], point[1] - kin.centre[b, 1], point[2] - kin.centre[b, 2]
         w, qx, qy, qz = xquat[b, 0], xquat[b, 1], xquat[b, 2], xquat[b, 3]
         turn[0, 0], turn[0, 1], turn[0, 2] = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - w * qz), 2 * (qx * qz + w * qy)
@@ -235,7 +236,7 @@ def _forces(kin, masses, xpos, xquat, v, a, per_rate, lines, mass, bias):  # typ
                 mass[k, j] += h0 * lines[0, j] + h1 * lines[1, j] + h2 * lines[2, j]
 
 
-@compiled
+@borrowing
 def _evaluate(mechanism, masses, w, r, qpos, tangent, velocity):  # type: ignore[no-untyped-def]
     """Fill M, h and the accelerations that the loops carry, for *velocity* ``(na,)`` where `close_one` was last."""
     kin, seen, passive = mechanism.kinematics, w.seen, mechanism.passive
@@ -259,7 +260,7 @@ def _evaluate(mechanism, masses, w, r, qpos, tangent, velocity):  # type: ignore
         r.bias[k] = 0.0
         for j in range(na):
             r.mass[k, j] = 0.0
-    _forces(kin, masses, w.places.xpos, w.places.xquat, r.v, r.a, r.per_rate, r.linear, r.mass, r.bias)
+    _forces(kin, masses, w.places.xpos, w.places.xquat, r.v, r.a, r.per_rate, r.linear, r.frames, r.mass, r.bias)
     for d in range(nv):
         force = masses.armature[d] * r.carried[d] + masses.damping[d] * r.qvel[d]
         if masses.dry[d] > 0.0:
@@ -284,7 +285,7 @@ def _evaluate(mechanism, masses, w, r, qpos, tangent, velocity):  # type: ignore
             r.mass[j, k] = r.mass[k, j]
 
 
-@compiled
+@borrowing
 def accelerations(r, tau, qdd):  # type: ignore[no-untyped-def]
     """Solve M qdd = tau - h by Cholesky's factor; whether M is positive definite."""
     na, low = tau.shape[0], r.factor

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.compiled import compiled
+from workbench.compiled import borrowing
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Frames:
         return len(self.bodies)
 
 
-@compiled
+@borrowing
 def place_frames(ids, bodies, positions, quaternions, xpos, xquat, site_xpos, site_xquat, out_pos, out_quat):  # type: ignore[no-untyped-def]
     """Fill rows *ids* of world poses: those of the sites first, then those of the frames."""
     sites = site_xpos.shape[1]

@@ -6,17 +6,19 @@ All kinematics, inertia and bias terms come from MuJoCo; what stands here is the
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from workbench.compiled import compiled, inlined
+from workbench.arrays import FloatArray
+from workbench.compiled import borrowing, compiled, inlined
 from workbench.reference.kinds import BALL, CONNECT, FREE, WELD
-from workbench.reference.linear import factor, solve, solve_transposed, solved
+from workbench.reference.linear import Lengths, factor, room_to_factor, solve, solve_beside, solve_transposed
 from workbench.reference.rows import acceleration_rows, body_motion, constraint_rows, point_motion
 from workbench.reference.sides import UNKNOWN, side_of
 
 
-@compiled
+@borrowing
 def integrate(qpos, velocity, joints, out):  # type: ignore[no-untyped-def]
     """Move one configuration along a velocity (hinge, slide, ball, free), for unit time; *out* may be *qpos*."""
     kinds, qpos_of, dof_of = joints
@@ -72,7 +74,7 @@ def follow_tangent(tangent, rates, velocity):  # type: ignore[no-untyped-def]
         velocity[d] = value
 
 
-@compiled
+@borrowing
 def velocities(tangent, qd, qvel):  # type: ignore[no-untyped-def]
     """Fill full velocities ``(n, nv)`` from actuated ones ``(n, na)``."""
     for s in range(tangent.shape[0]):
@@ -102,7 +104,7 @@ def keep_if_better(res, limits, qpos, kept, best, s):  # type: ignore[no-untyped
 
 @compiled
 def newton_step(  # type: ignore[no-untyped-def]
-    ids, closures, joints, split, table, poses, limits, qpos, kept, best, tangent, rank, condition, weakest, side
+    ids, closures, joints, split, table, poses, limits, qpos, kept, best, tangent, rank, condition, weakest, side, room
 ):  # fmt: skip
     """One Newton step on the passive joints of the listed samples; returns those that need another, as a new list.
 
@@ -117,8 +119,8 @@ def newton_step(  # type: ignore[no-untyped-def]
     passive, actuated = split
     m, nv, p, na = closures.block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
-    a, beta, perm, x = np.empty((m, p)), np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
-    step, work = np.zeros(nv), np.empty((p, p))
+    a, beta, perm, lengths = room
+    step, work, x = np.zeros(nv), np.empty((p, p)), np.empty(p)
     active = np.empty_like(ids)
     more = 0
     for n in range(ids.shape[0]):
@@ -130,7 +132,7 @@ def newton_step(  # type: ignore[no-untyped-def]
         for i in range(m):
             for j in range(p):
                 a[i, j] = jac[i, passive[j]]
-        found = factor(a, beta, perm)
+        found = factor(a, beta, perm, lengths)
         if good:
             for j in range(na):
                 for i in range(m):
@@ -160,11 +162,40 @@ def newton_step(  # type: ignore[no-untyped-def]
     return active[:more]
 
 
-@compiled
+class ProjectionRoom(NamedTuple):
+    """Room for the work of `projection` on one sample."""
+
+    jacobian: FloatArray
+    residual: FloatArray
+    rates: FloatArray
+    a: FloatArray
+    beta: FloatArray
+    order: np.ndarray
+    lengths: Lengths
+    force: FloatArray
+    passive_force: FloatArray
+    multipliers: FloatArray
+    velocity: FloatArray
+    """``(nbody, 6)`` spatial, as `acceleration`"""
+    acceleration: FloatArray
+    carried: FloatArray
+    """``(nbody, 3)`` forces"""
+
+
+def projection_room(rows: int, freedoms: int, passive: int, bodies: int) -> ProjectionRoom:
+    """Room for a model of so many constraint rows, velocities, passive velocities and bodies."""
+    m, nv, p, nb = rows, freedoms, passive, bodies
+    return ProjectionRoom(
+        np.empty((m, nv)), np.empty(m), np.empty(m), *room_to_factor(m, p, 1), np.empty(nv), np.empty(p), np.empty(m),
+        np.empty((nb, 6)), np.empty((nb, 6)), np.empty((nb, 3)),
+    )  # fmt: skip
+
+
+@borrowing
 def projection(  # type: ignore[no-untyped-def]
     closures, joints, split, bodies, poses, dynamics, mass_layout, platform, masses, gravity, base_rotation,
     base_position, qpos, qvel, tangent, qdd, applied, qacc, tau, closure_residual, velocity_residual,
-    acceleration_residual, motion, turning, reactions, slack,
+    acceleration_residual, motion, turning, reactions, slack, room,
 ):  # fmt: skip
     """Accelerations, actuator torques, platform motion and reaction forces of a block.
 
@@ -183,11 +214,10 @@ def projection(  # type: ignore[no-untyped-def]
     blocks, block_rows = closures.blocks, closures.block_rows
     root, moving, depth = closures.root, closures.moving, closures.depth
     m, nv, p, na = block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
-    nbody = masses.shape[0]
-    jac, res, rates = np.empty((m, nv)), np.empty(m), np.empty(m)
-    a, beta, perm, x = np.empty((m, p + 1)), np.empty(p), np.empty(p, dtype=np.int64), np.empty(p)
-    force, passive_force, multipliers = np.empty(nv), np.empty(p), np.empty(m)
-    v, acc, carried = np.empty((nbody, 6)), np.empty((nbody, 6)), np.empty((nbody, 3))
+    jac, res, rates = room.jacobian, room.residual, room.rates
+    a, beta, perm, lengths = room.a, room.beta, room.order, room.lengths
+    force, passive_force, multipliers = room.force, room.passive_force, room.multipliers
+    v, acc, carried = room.velocity, room.acceleration, room.carried
     for s in range(qpos.shape[0]):
         constraint_rows(closures, joints, qpos[s], cdof[s], com[s], site_xpos[s], site_xquat[s], anchors[s], jac, res)
         worst, open_by = 0.0, 0.0
@@ -206,10 +236,10 @@ def projection(  # type: ignore[no-untyped-def]
             a[i, p] = -rates[i]
             for j in range(p):
                 a[i, j] = jac[i, passive[j]]
-        rank = factor(a, beta, perm)
-        solved(a, perm, rank, p, x)
-        for j in range(p):
-            qacc[s, passive[j]] += x[j]
+        rank = factor(a, beta, perm, lengths)
+        solve_beside(a, p, rank)
+        for k in range(p):
+            qacc[s, passive[perm[k]]] += a[k, p]
         body_motion(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], v, acc)
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
         worst = 0.0

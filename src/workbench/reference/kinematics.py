@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.compiled import compiled, inlined
+from workbench.compiled import borrowing, inlined
 from workbench.reference.frames import Frames
 
 SLIDE, HINGE, TURNING, FLOATING = 0, 1, 2, 3
@@ -167,7 +167,7 @@ def _turn_axes(cdof, row, quaternion, rx, ry, rz):  # type: ignore[no-untyped-de
     _turning(cdof, row + 2, 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y), rx, ry, rz)
 
 
-@compiled
+@borrowing
 def place(kin, qpos, places):  # type: ignore[no-untyped-def]
     """Fill the places of one configuration ``(nq,)``."""
     xpos, xquat, anchors, cdof = places.xpos, places.xquat, places.anchors, places.cdof

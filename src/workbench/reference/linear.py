@@ -8,10 +8,12 @@ poses; with A P = Q R the same factor serves positions, velocities, acceleration
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from workbench.compiled import compiled
+from workbench.arrays import FloatArray
+from workbench.compiled import borrowing
 
 RANK_TOLERANCE = 1e-10
 """A column counts as dependent when its pivot is below this fraction of the largest one."""
@@ -20,20 +22,48 @@ RANK_TOLERANCE = 1e-10
 DIGITS_LEFT = 1e-3
 """A squared column length that fell below this fraction of what was last summed up is summed up again."""
 
+SPARE = 3
+"""Columns of zeros that a matrix to be factored has behind all others: columns are taken by fours, and the last four
+may be short of as many."""
 
-@compiled
-def factor(a, beta, perm):  # type: ignore[no-untyped-def]
-    """Factor ``a (m, p)`` in place; returns the rank. Reflectors below the diagonal, R on and above it.
 
-    ``beta (p,)`` receives the reflector scales, ``perm (p,)`` the column order. Where ``a`` has more columns than
-    ``perm`` entries, those are right-hand sides b and become Q^T b, for `solved`.
+class Lengths(NamedTuple):
+    """Room for `factor`."""
+
+    left: FloatArray
+    """``(p,)`` squared length of each column below the rows that are done"""
+    known: FloatArray
+    """``(p,)`` the same when it was summed up last"""
+    rows: np.ndarray
+    """``(m,)`` in which a column is not zero"""
+
+
+def room_to_factor(rows: int, columns: int, beside: int = 0) -> tuple[FloatArray, FloatArray, np.ndarray, Lengths]:
+    """A matrix of zeros with *beside* right-hand sides, and ``beta, perm, lengths``, as `factor` takes them.
+
+    It has at least as many rows as columns, for the solutions; what is not written stays zero.
     """
-    m, p, width = a.shape[0], perm.shape[0], a.shape[1]
-    steps = min(m, p)
-    sums, left, known = np.empty(width), np.zeros(p), np.empty(p)
+    high = max(rows, columns)
+    return (
+        np.zeros((high, columns + beside + SPARE)), np.zeros(columns), np.zeros(columns, dtype=np.int64),
+        Lengths(np.zeros(columns), np.zeros(columns), np.zeros(high, dtype=np.int64)),
+    )  # fmt: skip
+
+
+@borrowing
+def factor(a, beta, perm, lengths):  # type: ignore[no-untyped-def]
+    """Factor the first p columns of ``a`` in place; returns the rank. Reflectors below the diagonal, R on and above it.
+
+    ``a`` and all else is of `room_to_factor`: ``beta (p,)`` receives the reflector scales, ``perm (p,)`` the column
+    order. Between these columns and `SPARE` of zeros may stand right-hand sides b, which become Q^T b, for
+    `solve_beside`. Rows in which a column is zero cost nothing: loops that do not act on each other leave many.
+    """
+    m, p, width = a.shape[0], perm.shape[0], a.shape[1] - SPARE
+    left, known, rows = lengths.left, lengths.known, lengths.rows
     for j in range(p):
         perm[j] = j
-    # row by row, all columns at a time: the compiler can vectorise it, and rows where a column is zero cost nothing
+        left[j] = 0.0
+    # row by row, all columns at a time: the compiler can vectorise it
     for i in range(m):
         for j in range(p):
             left[j] += a[i, j] * a[i, j]
@@ -41,7 +71,7 @@ def factor(a, beta, perm):  # type: ignore[no-untyped-def]
         known[j] = left[j]
     rank = 0
     first = 0.0
-    for k in range(steps):
+    for k in range(p):
         best, pivot = -1.0, k
         for j in range(k, p):
             if left[j] > best:
@@ -51,9 +81,14 @@ def factor(a, beta, perm):  # type: ignore[no-untyped-def]
                 a[i, k], a[i, pivot] = a[i, pivot], a[i, k]
             perm[k], perm[pivot] = perm[pivot], perm[k]
             left[pivot], known[pivot] = left[k], known[k]
-        best = 0.0
-        for i in range(k, m):
-            best += a[i, k] * a[i, k]
+        head = a[k, k]
+        best, count = head * head, 0
+        for i in range(k + 1, m):
+            v = a[i, k]
+            rows[count] = i
+            if v != 0.0:
+                best += v * v
+                count += 1
         norm = math.sqrt(best)
         if k == 0:
             first = norm
@@ -62,28 +97,34 @@ def factor(a, beta, perm):  # type: ignore[no-untyped-def]
                 beta[j] = 0.0
             return rank
         rank += 1
-        head = a[k, k]
         alpha = -norm if head > 0.0 else norm
         # reflector v = (1, a[k+1:]/(head - alpha)), H = 1 - beta v v^T
         scale = 1.0 / (head - alpha)
-        beta[k] = (alpha - head) / alpha
+        turn = (alpha - head) / alpha
+        beta[k] = turn
         a[k, k] = alpha
-        for j in range(k + 1, width):
-            sums[j] = a[k, j]
-        for i in range(k + 1, m):
-            a[i, k] *= scale
-            v = a[i, k]
-            if v != 0.0:
-                for j in range(k + 1, width):
-                    sums[j] += v * a[i, j]
-        for j in range(k + 1, width):
-            sums[j] *= beta[k]
-            a[k, j] -= sums[j]
-        for i in range(k + 1, m):
-            v = a[i, k]
-            if v != 0.0:
-                for j in range(k + 1, width):
-                    a[i, j] -= sums[j] * v
+        for n in range(count):
+            a[rows[n], k] *= scale
+        for j in range(k + 1, width, 4):
+            s0, s1, s2, s3 = a[k, j], a[k, j + 1], a[k, j + 2], a[k, j + 3]
+            for n in range(count):
+                i = rows[n]
+                v = a[i, k]
+                s0 += v * a[i, j]
+                s1 += v * a[i, j + 1]
+                s2 += v * a[i, j + 2]
+                s3 += v * a[i, j + 3]
+            s0, s1, s2, s3 = turn * s0, turn * s1, turn * s2, turn * s3
+            a[k, j], a[k, j + 1], a[k, j + 2], a[k, j + 3] = (
+                a[k, j] - s0, a[k, j + 1] - s1, a[k, j + 2] - s2, a[k, j + 3] - s3
+            )  # fmt: skip
+            for n in range(count):
+                i = rows[n]
+                v = a[i, k]
+                # all four are read before the first is written, so that they are one vector
+                a[i, j], a[i, j + 1], a[i, j + 2], a[i, j + 3] = (
+                    a[i, j] - s0 * v, a[i, j + 1] - s1 * v, a[i, j + 2] - s2 * v, a[i, j + 3] - s3 * v
+                )  # fmt: skip
         # what is left of a column's length: taken off, and looked at again where that would lose digits
         for j in range(k + 1, p):
             left[j] -= a[k, j] * a[k, j]
@@ -92,24 +133,32 @@ def factor(a, beta, perm):  # type: ignore[no-untyped-def]
                 for i in range(k + 1, m):
                     left[j] += a[i, j] * a[i, j]
                 known[j] = left[j]
-    for j in range(steps, p):
-        beta[j] = 0.0
     return rank
 
 
-@compiled
-def solved(a, perm, rank, column, x):  # type: ignore[no-untyped-def]
-    """Least squares for a right-hand side that was factored along, in a column of ``a``; x ``(p,)``."""
-    for j in range(perm.shape[0]):
-        x[j] = 0.0
-    for k in range(rank - 1, -1, -1):
-        s = a[k, column]
-        for j in range(k + 1, rank):
-            s -= a[k, j] * x[perm[j]]
-        x[perm[k]] = s / a[k, k]
+@borrowing
+def solve_beside(a, p, rank):  # type: ignore[no-untyped-def]
+    """Least squares for all right-hand sides that were factored along, each in its column of ``a``.
+
+    Row k becomes the solution's entry ``perm[k]``, for k < p; entries beyond the rank are zero.
+    """
+    for k in range(rank, p):
+        for j in range(p, a.shape[1]):
+            a[k, j] = 0.0
+    for j in range(p, a.shape[1] - SPARE, 4):
+        for k in range(rank - 1, -1, -1):
+            s0, s1, s2, s3 = a[k, j], a[k, j + 1], a[k, j + 2], a[k, j + 3]
+            for i in range(k + 1, rank):
+                v = a[k, i]
+                s0 -= v * a[i, j]
+                s1 -= v * a[i, j + 1]
+                s2 -= v * a[i, j + 2]
+                s3 -= v * a[i, j + 3]
+            v = a[k, k]
+            a[k, j], a[k, j + 1], a[k, j + 2], a[k, j + 3] = s0 / v, s1 / v, s2 / v, s3 / v
 
 
-@compiled
+@borrowing
 def solve(a, beta, perm, rank, rhs, x):  # type: ignore[no-untyped-def]
     """Least squares ``min |A x - rhs|``; returns the residual norm. ``rhs (m,)`` is overwritten by Q^T rhs.
 
@@ -137,17 +186,16 @@ def solve(a, beta, perm, rank, rhs, x):  # type: ignore[no-untyped-def]
     return math.sqrt(residual)
 
 
-@compiled
+@borrowing
 def solve_transposed(a, beta, perm, rank, rhs, y):  # type: ignore[no-untyped-def]
     """Least-norm ``y (m,)`` with A^T y = rhs ``(p,)``."""
-    m = a.shape[0]
+    m = y.shape[0]
     for i in range(m):
-        y[i] = 0.0
-    for k in range(rank):
-        s = rhs[perm[k]]
-        for i in range(k):
-            s -= a[i, k] * y[i]
-        y[k] = s / a[k, k]
+        y[i] = rhs[perm[i]] if i < rank else 0.0
+    for i in range(rank):
+        y[i] /= a[i, i]
+        for k in range(i + 1, rank):
+            y[k] -= a[i, k] * y[i]
     for k in range(rank - 1, -1, -1):
         s = y[k]
         for i in range(k + 1, m):
@@ -160,8 +208,8 @@ def solve_transposed(a, beta, perm, rank, rhs, y):  # type: ignore[no-untyped-de
 
 def least_squares(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, int, float]:
     """Solve one system with the compiled routines: solution, rank and residual norm (for tests and set-up)."""
-    a = np.array(matrix, dtype=np.float64, order="C")
-    beta, perm, x = np.zeros(a.shape[1]), np.zeros(a.shape[1], dtype=np.int64), np.zeros(a.shape[1])
-    rank = factor(a, beta, perm)
+    a, beta, perm, lengths = room_to_factor(*matrix.shape)
+    a[: len(matrix), :-SPARE] = matrix
+    rank, x = factor(a, beta, perm, lengths), np.zeros(len(perm))
     residual = solve(a, beta, perm, rank, np.array(rhs, dtype=np.float64), x)
     return x, int(rank), float(residual)

@@ -16,6 +16,7 @@ from workbench.errors import ModelError, MotionError, ParameterError
 from workbench.reference.closure import LoopCloser, loop_rows
 from workbench.reference.continuation import NEWTON_STEPS, Assembly, Continuation
 from workbench.reference.engine import Evaluator
+from workbench.reference.linear import room_to_factor
 from workbench.reference.platform_kernels import platform_accelerations, platform_jacobian, platform_newton
 from workbench.reference.sides import pattern_of
 from workbench.reference.task import COORDINATES, POSITIONS, Task, task_of
@@ -111,6 +112,7 @@ class PlatformCloser(Continuation):
                 tables.closures, tables.joints, tables.bodies, self._table, self._base, poses.tables,
                 dynamics.cdof_dot, x[rows], xd[rows], xdd[rows], assembly.tangent[rows], assembly.qpos[rows],
                 qvel[rows], qacc[rows], velocity[rows], acceleration[rows],
+                room_to_factor(int(tables.closures.block_rows[-1]) + x.shape[1], qvel.shape[1]),
             )  # fmt: skip
 
         self.engine.in_blocks(block, n)
@@ -168,14 +170,15 @@ class PlatformCloser(Continuation):
         found = self._nothing(count, aim.shape[1])
         qpos = evaluator.qpos
         qpos[:count] = start
-        limits = self.limits
+        limits, loops = self.limits, int(self.tables.closures.block_rows[-1])
+        room = room_to_factor(loops + aim.shape[1], self.engine.model.nv)
         active = np.arange(count)
         for _ in range(NEWTON_STEPS):
             poses = evaluator.place(active)
             active = platform_newton(
                 active, self.tables.closures, self.joints, self._table, self._base, self._side_table, poses.tables,
                 limits, aim, qpos, found.qpos, found.residual, found.tangent, found.rank, found.condition,
-                found.weakest, found.side,
+                found.weakest, found.side, room,
             )  # fmt: skip
             if not len(active):
                 break

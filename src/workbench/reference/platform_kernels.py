@@ -21,12 +21,12 @@ from workbench.reference.task_rows import task_acceleration, task_rows
 @compiled
 def platform_newton(  # type: ignore[no-untyped-def]
     ids, closures, joints, task, base, table, poses, limits, aim, qpos, kept, best, tangent, rank, condition, weakest,
-    side,
+    side, room,
 ):  # fmt: skip
     """One Newton step on all joints of the listed samples, the task coordinates at ``aim``; returns the unfinished.
 
     As `newton_step`, whose results and limits these are; ``tangent (n, nv, m)`` holds velocities per unit velocity of
-    the task coordinates.
+    the task coordinates. ``room`` is that of `workbench.reference.linear.room_to_factor`.
     """
     cdof, com, site_xpos, site_xquat, anchors = poses
     block_rows, root, moving, depth = closures.block_rows, closures.root, closures.moving, closures.depth
@@ -34,7 +34,8 @@ def platform_newton(  # type: ignore[no-untyped-def]
     m = loops + given
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
     values, rise, still = np.empty(given), np.empty(given), np.zeros(3)
-    a, beta, perm, x = np.empty((m, nv)), np.empty(nv), np.empty(nv, dtype=np.int64), np.empty(nv)
+    x = np.empty(nv)
+    a, beta, perm, lengths = room
     work = np.empty((nv, nv))
     active = np.empty_like(ids)
     more = 0
@@ -53,7 +54,7 @@ def platform_newton(  # type: ignore[no-untyped-def]
         for i in range(m):
             for j in range(nv):
                 a[i, j] = jac[i, j]
-        found = factor(a, beta, perm)
+        found = factor(a, beta, perm, lengths)
         if good:
             for j in range(given):
                 for i in range(m):
@@ -80,11 +81,12 @@ def platform_newton(  # type: ignore[no-untyped-def]
 @compiled
 def platform_accelerations(  # type: ignore[no-untyped-def]
     closures, joints, bodies, task, base, poses, cdof_dot, aim, xd, xdd, tangent, qpos, qvel, qacc, velocity_residual,
-    acceleration_residual,
+    acceleration_residual, room,
 ):  # fmt: skip
     """Fill accelerations ``qacc (n, nv)`` of all freedoms from those of the task coordinates, and what is left open.
 
-    ``qvel`` is the tangent times ``xd``; what is open counts loops and task coordinates alike.
+    ``qvel`` is the tangent times ``xd``; what is open counts loops and task coordinates alike. ``room`` as
+    there.
     """
     cdof, com, site_xpos, site_xquat, anchors = poses
     block_rows, root, moving, depth = closures.block_rows, closures.root, closures.moving, closures.depth
@@ -93,7 +95,8 @@ def platform_accelerations(  # type: ignore[no-untyped-def]
     m, nbody = loops + given, root.shape[0]
     jac, res, rates = np.empty((m, nv)), np.empty(m), np.empty(m)
     values, rise, still = np.empty(given), np.empty(given), np.zeros(3)
-    a, beta, perm, x = np.empty((m, nv)), np.empty(nv), np.empty(nv, dtype=np.int64), np.empty(nv)
+    x = np.empty(nv)
+    a, beta, perm, lengths = room
     v, acc = np.empty((nbody, 6)), np.empty((nbody, 6))
     for s in range(aim.shape[0]):
         constraint_rows(closures, joints, qpos[s], cdof[s], com[s], site_xpos[s], site_xquat[s], anchors[s], jac, res)
@@ -114,7 +117,7 @@ def platform_accelerations(  # type: ignore[no-untyped-def]
             for d in range(nv):
                 a[i, d] = jac[i, d]
         velocity_residual[s] = worst
-        rank = factor(a, beta, perm)
+        rank = factor(a, beta, perm, lengths)
         for d in range(nv):
             value = 0.0
             for j in range(given):

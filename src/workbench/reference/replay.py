@@ -228,6 +228,8 @@ class _Runner:
     def __init__(self, reference: MujocoReference, motion_at: MotionAt, start: float, force: FloatArray) -> None:
         self._reference, self._motion_at, self._start, self._force = reference, motion_at, start, force
         self._initial = reference.inverse_dynamics(*motion_at(np.array([start])), "distributed", force)
+        self._last: tuple[FloatArray, FloatArray] = np.zeros(0), np.zeros(0)
+        """times and the reference's torques: the last probe and the coarsest replay ask for the same"""
 
     def run(
         self,
@@ -268,7 +270,10 @@ class _Runner:
         return errors
 
     def _own(self, times: FloatArray, middle: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
-        return self._reference.inverse_dynamics(*middle, "distributed", self._force, along=times).tau
+        if not np.array_equal(self._last[0], times):
+            found = self._reference.inverse_dynamics(*middle, "distributed", self._force, along=times)
+            self._last = times, found.tau
+        return self._last[1]
 
     def _pull(self) -> tuple[str, FloatArray] | None:
         """The platform's site and the force on it ``(3,)``, world frame; None where there is none."""

@@ -6,7 +6,7 @@ mass of the kinematic tree.
 
 from __future__ import annotations
 
-from workbench.compiled import compiled, inlined
+from workbench.compiled import borrowing, inlined
 from workbench.reference.kinds import CONNECT, JOINT, SPIN, TENDON, WELD
 
 
@@ -48,7 +48,7 @@ def _end(site_xpos, anchors, point, i):  # type: ignore[no-untyped-def]
     return site_xpos[point, i] if point >= 0 else anchors[-1 - point, i]
 
 
-@compiled
+@borrowing
 def residuals(closures, joints, qpos, site_xpos, site_xquat, res):  # type: ignore[no-untyped-def]
     """Fill the residual ``(m,)`` of one sample: how far its loops are open, m and rad."""
     blocks, block_rows, polynomials, tendons = (
@@ -87,7 +87,7 @@ def _slope(c, y):  # type: ignore[no-untyped-def]
     return c[1] + y * (2.0 * c[2] + y * (3.0 * c[3] + y * 4.0 * c[4]))
 
 
-@compiled
+@borrowing
 def jacobian_rows(closures, joints, qpos, cdof, com, site_xpos, anchors, jac):  # type: ignore[no-untyped-def]
     """Fill the constraint Jacobian ``(m, nv)`` of one sample."""
     blocks, block_rows, polynomials = closures.blocks, closures.block_rows, closures.polynomials
@@ -131,7 +131,7 @@ def jacobian_rows(closures, joints, qpos, cdof, com, site_xpos, anchors, jac):  
                     jac[row, dof_of[j]] -= slope * tendons[s2, j]
 
 
-@compiled
+@borrowing
 def constraint_rows(closures, joints, qpos, cdof, com, site_xpos, site_xquat, anchors, jac, res):  # type: ignore[no-untyped-def]
     """Fill the constraint Jacobian ``(m, nv)`` and residual ``(m,)`` of one sample."""
     residuals(closures, joints, qpos, site_xpos, site_xquat, res)
@@ -166,7 +166,7 @@ def point_motion(v, a, com, point):  # type: ignore[no-untyped-def]
     return vx, vy, vz, ax, ay, az
 
 
-@compiled
+@borrowing
 def acceleration_rows(closures, joints, qpos, com, site_xpos, anchors, qvel, qacc, v, a, out):  # type: ignore[no-untyped-def]
     """Second time derivative of every constraint, ``(m,)``: J qacc + Jdot qvel, from the bodies' motion."""
     blocks, block_rows, polynomials = closures.blocks, closures.block_rows, closures.polynomials

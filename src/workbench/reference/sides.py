@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.compiled import compiled, inlined
+from workbench.compiled import borrowing, inlined
 from workbench.reference.kinds import CONNECT, JOINT, SPIN, TENDON, WELD
-from workbench.reference.linear import factor
+from workbench.reference.linear import factor, room_to_factor
 from workbench.reference.structure import IntArray, Structure
 
 UNKNOWN = -1
@@ -84,7 +84,7 @@ def _eliminate(a, mean):  # type: ignore[no-untyped-def]
     return negative, volume
 
 
-@compiled
+@borrowing
 def side_of(jac, rank, table, work):  # type: ignore[no-untyped-def]
     """Side of one sample: a bit for each block, set where its determinant is negative, or `UNKNOWN`.
 
@@ -108,7 +108,7 @@ def side_of(jac, rank, table, work):  # type: ignore[no-untyped-def]
     return side
 
 
-@compiled
+@borrowing
 def same_side(before, after, table, work, same):  # type: ignore[no-untyped-def]
     """Fill ``same (k,)``: which of these rows ``(k, m, nv)`` of neighbours are turned over in no block.
 
@@ -209,7 +209,9 @@ def _starts(parts: list[np.ndarray]) -> IntArray:
 def side_at(jacobian: FloatArray, columns: IntArray, table: SideTable) -> int:
     """Side of one configuration with rows ``(m, nv)``, of which *columns* are solved for."""
     p = len(columns)
-    rank = factor(np.ascontiguousarray(jacobian[:, columns]), np.empty(p), np.empty(p, dtype=np.int64))
+    a, *room = room_to_factor(len(jacobian), p)
+    a[: len(jacobian), :p] = jacobian[:, columns]
+    rank = factor(a, *room)
     return int(side_of(jacobian, rank, table, np.empty((p, p))))
 
 

@@ -64,7 +64,7 @@ def _twist(i, quaternion, aim, omega, values, rates, rise):  # type: ignore[no-u
     rise[0] = (nid * oi + njd * oj + nkd * ok) / d - along * nid / (d * d)
 
 
-@inlined
+@compiled
 def _rotation_vector(axes, quaternion, aim, omega, values, rates, rise):  # type: ignore[no-untyped-def]
     """Components of the rotation vector r, R = exp [r]x: rd = (1 - [r]x/2 + c [r]x^2) omega."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
