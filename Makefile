@@ -18,7 +18,7 @@ FLOORS_TESTS ?= $(patsubst %,tests/test_%.py,campaign_run campaign_spec case_fig
   edited_runs mjcf_roundtrip mjcf_setup pinocchio_reference portable recorded reference_closure rendering report_formats \
   report_pictures statements studio_session sweep_run urdf)
 # Campaigns whose reports are kept in reports/published.
-PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models design_sweep control_4rprp
+PUBLISHED := almeida_2010 almeida_2010_as_printed garcia_murillo_2016 mass_models design_sweep control_4rprp almeida_2010_control
 
 # Installs the package: environment, constraints, extra.
 install = $(if $(UV),"$(UV)" pip install --quiet --python $(1)/bin/python,$(1)/bin/python -m pip install --quiet --disable-pip-version-check) --constraint $(2) --editable '.[$(3)]'
@@ -61,7 +61,7 @@ test: lint ## Check style and types, then run the tests (SLOW=1: all of them)
 	$(BIN)/pytest -n 2 --dist worksteal $(if $(SLOW),-m "(slow or not slow) and not long") $(PYTEST_ARGS)
 
 test-slow: $(STAMP) ## Run only the tests marked slow
-	$(BIN)/pytest -m "slow and not long" $(PYTEST_ARGS)
+	$(BIN)/pytest -n 2 --dist loadfile -m "slow and not long" $(PYTEST_ARGS)
 
 test-long: $(STAMP) ## Run the tests that take many minutes, by hand: all bad inputs, all commands among planted files
 	$(BIN)/pytest -m long $(PYTEST_ARGS)
@@ -83,6 +83,7 @@ mutants: $(STAMP) ## Plant small faults in the core modules and see which no tes
 	PYTHONPATH=tests:src $(BIN)/python -m mutants $(MUTANTS_ARGS)
 
 # Rendered pictures depend on the machine's OpenGL, so those that are kept are used again; remove them to draw new ones.
+# A film of a study shows its very runs and is drawn anew.
 reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings in their heads differ
 	@for name in $(PUBLISHED); do \
 	  built=build/reports/$$name; kept=reports/published/$$name; drawn=build/pictures/$$name; \
@@ -90,9 +91,12 @@ reports: $(STAMP) ## Rebuild reports/published: only date, machine and timings i
 	    $(BIN)/workbench run campaigns/$$name.toml --quick --out $$drawn >/dev/null || exit 1; \
 	    if [ -f $$drawn/pictures/film.webp ]; then mkdir -p $$kept; cp -R $$drawn/pictures $$kept/pictures; fi; \
 	  fi; \
-	  rm -rf $$built; \
-	  $(BIN)/workbench run campaigns/$$name.toml --no-pictures --out $$built || exit 1; \
-	  if [ -d $$kept/pictures ]; then \
+	  rm -rf $$built; pictures=--no-pictures; \
+	  if grep -qE '^\[control\]' campaigns/$$name.toml; then pictures=--pictures; fi; \
+	  $(BIN)/workbench run campaigns/$$name.toml $$pictures --out $$built || exit 1; \
+	  if [ $$pictures = --pictures ]; then \
+	    mkdir -p $$kept; rm -rf $$kept/pictures; cp -R $$built/pictures $$kept || exit 1; \
+	  elif [ -d $$kept/pictures ]; then \
 	    cp -R $$kept/pictures $$built/pictures && $(BIN)/workbench report $$built >/dev/null || exit 1; \
 	  fi; \
 	  rm -rf $$kept/report.html $$kept/report.md $$kept/figures; \

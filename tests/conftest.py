@@ -22,6 +22,23 @@ def repository() -> Path:
     return Path(__file__).resolve().parents[1]
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of reports stay empty: for tests of words and tables, as drawing takes seven eighths of the time."""
+    from workbench.report.plot import Plot
+    from workbench.report.svg import new_figure, svg_of
+
+    monkeypatch.setattr(Plot, "drawn", lambda plot, size: svg_of(new_figure(*size), plot.key))
+
+
+@pytest.fixture
+def inline_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sweeps and studies compute in this process: a worker takes seconds to start, and is the subject of few tests."""
+    from inline_pool import Inline
+
+    monkeypatch.setattr("workbench.sweep.computing.Supervisor", Inline)
+
+
 @pytest.fixture(scope="session")
 def warm_kernels(repository: Path) -> None:
     """Both robots' kernels compiled and kept: a first use says so on stderr, where some tests look at every line."""

@@ -1,4 +1,4 @@
-"""A pool that computes a study's runs in the process of the test."""
+"""A pool that computes what a sweep or a study consists of in the process of the test."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 class Inline:
-    """Runs a study's tasks in this process; *before* is called with the number of each."""
+    """Runs tasks in this process; *before* is called with the number of each."""
 
     before: Callable[[int], None] = staticmethod(lambda count: None)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from workbench.cli import main
+from workbench.commands import run as run_command
 
 CANDIDATES = """
 [[candidate]]
@@ -85,7 +86,11 @@ def listing(directory: Path) -> dict[str, bytes | None]:
 
 
 class Workbench:
-    """Calls of ``workbench`` in this process, in a directory of its own; reports are left out unless asked for."""
+    """Calls of ``workbench`` in this process, in a directory of its own; what takes long is left out unless asked for.
+
+    That are reports, pictures, and what `--quick` leaves out: the evidence about the reference takes six times as long
+    as all the rest of a small run.
+    """
 
     def __init__(self, directory: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
         self.directory = directory
@@ -95,11 +100,19 @@ class Workbench:
         monkeypatch.setattr("workbench.report.build_report", lambda directory: None)
         monkeypatch.setattr("workbench.commands.sweeps.report_apart", lambda directory: None)
         monkeypatch.setattr("workbench.rendering.run_pictures.RunPictures", lambda: None)
+        monkeypatch.setattr("workbench.commands.run_cases.WORTH_IT", 1_000_000)
+        monkeypatch.setattr("workbench.rendering.tracking_film.draw_tracking", lambda footage, directory: None)
+        self._effort = run_command._effort
+        monkeypatch.setattr(run_command, "_effort", lambda engines, quick: self._effort(engines, True))
 
     def write(self, text: str, name: str = "small.toml") -> str:
         """Write a file and return its name."""
         (self.directory / name).write_text(text, encoding="utf-8")
         return name
+
+    def gather_evidence(self) -> None:
+        """From now on a run gathers power balance and forward replay, as the command does unless told `--quick`."""
+        self._patch.setattr(run_command, "_effort", self._effort)
 
     def __call__(self, *arguments: str | os.PathLike[str]) -> Done:
         """Call the command line."""

@@ -229,6 +229,7 @@ def test_the_campaign_goes_over_the_robot_file_joint_by_joint(workbench: Workben
 
 
 @pytest.mark.parametrize("limits", ["", "[actuators.q1]\npeak = 100.0\n"])
+@pytest.mark.usefixtures("inline_workers")
 def test_a_sweep_says_that_it_holds_nothing_against_limits(workbench: Workbench, limits: str) -> None:
     robot_with(workbench.directory, limits)
     sweep = (FIVEBAR / "fivebar.toml").read_text().partition("[[case]]")

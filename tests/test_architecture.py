@@ -47,6 +47,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         "limits",
         "no_exit",
         "processes",
+        "drawing_process",
         "reading",
         "parquet_columns",
         "output_file",

@@ -1,7 +1,7 @@
 """Bad inputs of every kind end in exit code 2 and one line that names file and place; none hangs or takes all memory.
 
-The table is in `bad_inputs` and `bad_runs`; a worker that is watched calls the command line with each. Every eighth is
-tried with the other tests, a quarter with the slow ones, the rest with the long ones.
+The table is in `bad_inputs` and `bad_runs`; a worker that is watched calls the command line with each. One in
+twenty-four is tried with the other tests, a third with the slow ones, the rest with the long ones.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="pipes and limits of memory are POSIX"),
     pytest.mark.usefixtures("warm_kernels"),
 ]
-EVERY = 8
-SLOWLY = (1, 5)
+EVERY = 24
+SLOWLY = (1, 5, 8, 9, 13, 16, 17, 21)
 
 
 @pytest.fixture(scope="module")

@@ -65,6 +65,7 @@ def series(workbench: Workbench, case: str, run: str = "reports/small") -> pd.Da
 
 
 def test_two_runs_give_the_same_bytes(workbench: Workbench) -> None:
+    workbench.gather_evidence()
     assert workbench.run(SMALL, "--out", "one").code == 0
     assert workbench.run(SMALL, "--out", "two").code == 0
     one, two = (listing(workbench.directory / name) for name in ("one", "two"))
@@ -156,6 +157,7 @@ def test_every_key_that_a_reader_needs(workbench: Workbench) -> None:
 
 @pytest.mark.parametrize("page", ["campaign.md", "run-directory.md"])
 def test_every_key_is_documented(workbench: Workbench, repository: Path, page: str) -> None:
+    workbench.gather_evidence()
     workbench.run(SMALL)
     text = (repository / "docs" / page).read_text(encoding="utf-8")
     record = manifest(workbench)

@@ -13,10 +13,11 @@ from control_machines import PENDULUM, reference_of
 from small_campaign import Workbench
 from test_control_study import write
 from workbench.arrays import FloatArray
+from workbench.campaign.control_spec import PRINTED_COST
 from workbench.control.figures import Error
 from workbench.control.loop import TRACKED, UNSTABLE, Tracked
 from workbench.control.names import NOT_RUN
-from workbench.control.routes import AGREED, IMPLICIT_STEP, LONGEST_STEP, by_routes
+from workbench.control.routes import AGREED, IMPLICIT_STEP, LONGEST_STEP, by_routes, is_halved
 from workbench.reference.forward import Plant
 from workbench.reference.replay import quiet
 from workbench.reference.stiff_plant import StiffPlant
@@ -83,7 +84,7 @@ COARSE, FINE = ("second", 1e-3, 1), ("second", 5e-4, 1)
 
 
 def routes(script: Scripted, period: float = 1e-3) -> tuple[float | None, str, float]:
-    found = by_routes(cast(Any, "own"), cast(Any, script), script.run, error, period, None)
+    found = by_routes(cast(Any, "own"), cast(Any, script), script.run, error, period, None, is_halved(1.0 / period, ""))
     return (found.second.platform_rms if found.second else None), found.second_status, found.spread
 
 
@@ -130,6 +131,9 @@ def test_fast_loops_are_not_halved_and_a_route_may_be_left_out() -> None:
     script = Scripted(True, {("own", period, 1): 1.0, ("second", period, 1): 1.0})
     routes(script, period)
     assert script.asked == [("own", period, 1), ("second", period, 1)]
+    assert is_halved(2000.0, "2000")
+    assert is_halved(1.6e4, PRINTED_COST)  # sentences are judged by these
+    assert not is_halved(1.6e4, "16000")
     alone = by_routes(cast(Any, "own"), None, Scripted(True, {**OWN}).run, error, 1e-3, None)
     assert alone.second_status == NOT_RUN
     assert alone.halved is not None

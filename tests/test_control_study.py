@@ -52,6 +52,18 @@ bandwidths = [10.0]
 """
 
 
+CLAIM_OF_A_LOAD = """
+[[control.claim]]
+id = "load"
+text = "enough with a load"
+kind = "enough"
+model = "lumped"
+against = "distributed"
+controller = "computed torque"
+parameters = { payloud = 1.0 }
+"""
+
+
 def write(folder: Path, *changes: tuple[str, str], more: str = "") -> Path:
     text = CAMPAIGN
     for old, new in changes:
@@ -81,6 +93,7 @@ def planned(path: Path, controllers: list[Path] | None = None) -> tuple[StudyPla
         ("rates = [500.0]", "rates = [500.0]\nlimits = true", "neither robot file nor campaign says"),
         ("rates = [500.0]", "rates = [500.0]\nnoise = { q9 = 1e-6 }", 'no actuated joint "q9"'),
         ("rates = [500.0]", "rates = [500.0]\nplant = { payloud = 1.0 }", "control.plant"),
+        ("bandwidths = [10.0]", "bandwidths = [10.0]" + CLAIM_OF_A_LOAD, 'control.claim "load"'),
         ("rates = [500.0]", "rates = [500.0, 500.0]", "stands twice"),
         ('["computed torque"]', '["computed torqu"]', 'no controller "computed torqu"'),
         ('["lumped", "distributed"]', '["lumpt"]', 'has no candidate "lumpt"'),

@@ -120,6 +120,7 @@ def test_endless_lists_of_names_are_refused(run: Path) -> None:
 
 
 @pytest.mark.parametrize("folder", ["figures", "tables"])
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_is_written_into_its_run_alone(run: Path, tmp_path: Path, folder: str) -> None:
     (tmp_path / "elsewhere").mkdir()
     (run / folder).symlink_to(tmp_path / "elsewhere")
@@ -128,6 +129,7 @@ def test_a_report_is_written_into_its_run_alone(run: Path, tmp_path: Path, folde
     assert list((tmp_path / "elsewhere").iterdir()) == []
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_that_cannot_be_written_names_its_own_file(run: Path) -> None:
     (run / "report.md").mkdir()
     with pytest.raises(OutputError, match=r"report\.md: the report cannot be written"):
@@ -135,6 +137,7 @@ def test_a_report_that_cannot_be_written_names_its_own_file(run: Path) -> None:
     assert not list(run.glob(".*"))
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_link_to_itself_is_no_missing_picture(run: Path) -> None:
     store_pictures(run)
     record = run / "pictures" / "pictures.json"
@@ -144,6 +147,7 @@ def test_a_link_to_itself_is_no_missing_picture(run: Path) -> None:
         build_report(run, ["md"])
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_malformed_still_is_named(run: Path) -> None:
     store_pictures(run)
     (run / "pictures" / "mechanism.webp").write_bytes(b"RIFF\0\0\0\0WEBP" + b"x" * 100)

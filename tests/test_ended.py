@@ -23,14 +23,14 @@ pytestmark = [
     pytest.mark.usefixtures("warm_kernels"),
 ]
 
-LONG = SMALL.replace("samples = 21", "samples = 60000")
+LONG = SMALL.replace("samples = 21", "samples = 12000")
 
 
 @contextlib.contextmanager
 def running(place: Path) -> Iterator[subprocess.Popen[str]]:
     """Start a run with pictures, and go on when it draws."""
     (place / "temporary").mkdir(exist_ok=True)
-    command = [sys.executable, "-P", "-m", "workbench", "run", "small.toml", "--only", "first", "--only", "second"]
+    command = [sys.executable, "-P", "-m", "workbench", "run", "small.toml", "--quick"]
     with subprocess.Popen(
         command, cwd=place, env={**os.environ, "TMPDIR": str(place / "temporary")}, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,

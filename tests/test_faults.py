@@ -19,6 +19,7 @@ import pytest
 
 import sweep_faults
 import sweep_tasks
+from inline_pool import Inline
 from small_campaign import Workbench
 from sweep_campaign import SWEEP
 from test_report import parse
@@ -229,7 +230,9 @@ def tree(path: Path) -> list[Path]:
 
 def test_a_worker_killed_once_leaves_no_trace(workbench: Workbench, monkeypatch: pytest.MonkeyPatch) -> None:
     text = SWEEP.replace("samples = 40", "samples = 12")
-    assert workbench.run(text, "--out", "calm").code == 0
+    with monkeypatch.context() as patched:
+        patched.setattr("workbench.sweep.computing.Supervisor", Inline)
+        assert workbench.run(text, "--out", "calm").code == 0
     marker = workbench.directory / "killed"
     plant(monkeypatch, lambda context: partial(sweep_faults.once_setup, context, str(marker), 2))
     assert workbench.run(text, "--out", "disturbed").code == 0

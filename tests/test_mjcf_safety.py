@@ -15,7 +15,7 @@ import pytest
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, WorkbenchError
 from workbench.mjcf.files import MAX_BYTES
-from workbench.mjcf.safety import MAX_DEPTH, MAX_ELEMENTS
+from workbench.mjcf.safety import MAX_DEPTH, MAX_ELEMENTS, _memory, refuse_element
 from workbench.reference.check import check_model
 from workbench.robots.edit import edit_file
 from workbench.robots.load import load_model, open_model
@@ -160,6 +160,20 @@ def test_limits_leave_room(tmp_path: Path) -> None:
     text = inside("worldbody", many + deep).replace("<asset>", "<asset>" + texture)
     path.write_text(text.replace("<option", '<size memory="100M"/><option', 1))
     assert load_model(path).closed_form is not None
+
+
+@pytest.mark.parametrize(("power", "unit"), list(enumerate(["", "K", "M", "G", "T", "P", "E"])))
+def test_memory_is_counted_in_its_unit_and_limited_to_the_byte(power: int, unit: str) -> None:
+    assert {_memory(f"3{unit}"), _memory(f"3{unit.lower()}")} == {3.0 * 1024**power}
+    most = 2**30 // 1024**power
+
+    def ask(count: int) -> None:
+        refuse_element("size", {"memory": f"{count}{unit}"}, 2, 2, "model.xml:3")
+
+    if most:
+        ask(most)
+    with pytest.raises(ModelError, match=rf'model.xml:3: <size memory="{most + 1}{unit}">; allowed: at most 1G'):
+        ask(most + 1)
 
 
 def make_directory(path: Path) -> None:

@@ -12,7 +12,8 @@ import pytest
 from nullspace_oracle import NullSpaceOracle
 from workbench.errors import ModelError
 from workbench.mjcf.prepared import Prepared, prepare
-from workbench.mjcf.same_robot import check_same_robot
+from workbench.mjcf.same_robot import BODIES, EQUALITIES, GEOMS, JOINTS, SITES, TENDONS, check_same_robot
+from workbench.mjcf.same_robot import PLAIN as PLAIN_ACTUATOR
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
 
@@ -213,6 +214,31 @@ def test_a_prepared_model_that_is_another_robot_is_refused(ready: Prepared, name
     with pytest.raises(ModelError, match=r"model.xml: the model as it was prepared is not the file's") as caught:
         check_same_robot(ready.user, other, ready.preparation, "model.xml")
     assert "\n" not in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def with_tendon() -> Prepared:
+    tendon = '<tendon><fixed name="t"><joint joint="crank" coef="1.3"/></fixed></tendon>'
+    return prepare(robot(sections=tendon), "model.xml", None, SETUP)
+
+
+COMPARED = (
+    *BODIES, *GEOMS, *SITES, *JOINTS, "dof_frictionloss", "qpos0", "qpos_spring", *TENDONS, *EQUALITIES,
+    *PLAIN_ACTUATOR,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("array", COMPARED)
+def test_each_array_that_is_compared_is_refused_by_name_where_it_differs(with_tendon: Prepared, array: str) -> None:
+    assert with_tendon.preparation is not None
+    check_same_robot(with_tendon.user, with_tendon.model, with_tendon.preparation, "model.xml")
+    for side in ("first", "last"):
+        other = copy.copy(with_tendon.model)
+        values = getattr(other, array)
+        row = 0 if side == "first" else -1
+        values.flat[row] = not values.flat[row] if values.dtype == bool else values.flat[row] + 1
+        with pytest.raises(ModelError, match=rf"is not the file's: {array}( of \"\w+\")? is "):
+            check_same_robot(with_tendon.user, other, with_tendon.preparation, "model.xml")
 
 
 MASSES = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -99,7 +100,7 @@ def test_a_short_run_begins_with_what_is_quick_and_leaves_out_what_fails_by_itse
         "b.py": ({"b.py::quick": 0.05, "b.py::slow": 1.0}, []),
     }
     monkeypatch.setattr(short, "_without_fault", lambda file, uncompiled: without_fault[file])
-    tests, total, failing = short.tests_of(("a.py", "b.py"), uncompiled=False)
+    tests, total, failing = short.tests_of(("a.py", "b.py"), uncompiled=False, longest=short.LONGEST)
     assert tests == ["a.py::quicker", "a.py::quick", "b.py::quick", "a.py::slow", "b.py::slow"]
     assert total == pytest.approx(3.35)
     assert failing == ["a.py::broken"]
@@ -115,7 +116,7 @@ def test_a_fault_that_no_test_could_notice_is_not_tried_and_not_counted(
     monkeypatch.setattr(trial, "trial", never)
     module = "metrics.py"
     planted = [command.Planted("metrics", module, one) for one in mutants_of(source_of(module))[:3]]
-    outcome, tried = command._try(planted[0], 60.0, ["tests/test_metrics.py"])
+    outcome, tried = command._try(planted[0], 60.0, ["tests/test_metrics.py"], [])
     assert (outcome.status, tried) == (trial.BROKEN, 0)
     assert "tests/test_metrics.py::test" in outcome.by
     states = [trial.BROKEN, trial.KILLED, trial.KILLED]
@@ -128,6 +129,31 @@ def test_a_fault_that_no_test_could_notice_is_not_tried_and_not_counted(
     assert f"not tried: metrics  {module}:{planted[0].mutant.line}" in said
     known[planted[0].key]["status"] = trial.SURVIVED
     assert command._summary(planted, known) == 1
+
+
+def test_what_survives_a_short_run_has_to_survive_longer_tests(monkeypatch: pytest.MonkeyPatch) -> None:
+    durations = {"short.py": {"short.py::quick": 0.1, "short.py::long": 9.0}, "longer.py": {"longer.py::long": 20.0}}
+    monkeypatch.setattr(short, "_without_fault", lambda file, uncompiled: (durations[file], []))
+    asked: list[tuple[list[str], bool]] = []
+    outcomes = {1: trial.Outcome(trial.SURVIVED, "", 1.0), 2: trial.Outcome(trial.KILLED, "longer.py::long", 2.0)}
+
+    def tried(tests: list[str], *_: object, interpreted: bool = False, **__: object) -> trial.Outcome:
+        asked.append((tests, interpreted))
+        return outcomes[len(asked)]
+
+    monkeypatch.setattr(trial, "trial", tried)
+    monkeypatch.setattr(command.tree, "planted", lambda *_: nullcontext())
+    monkeypatch.setattr(command.tree, "own_cache", lambda: nullcontext(Path("own")))
+    module = "reference/rows.py"
+    fault = command.Planted("reference", module, mutants_of(source_of(module))[0])
+    outcome, count = command._try(fault, 60.0, ["short.py"], ["longer.py", "short.py"])
+    assert asked == [
+        (["short.py::quick"], True),
+        (["short.py::quick", "longer.py::long", "short.py::long"], False),  # compiled, and whatever it takes
+    ]
+    assert (outcome.status, outcome.by, outcome.seconds, count) == (trial.KILLED, "longer.py::long", 3.0, 4)
+    assert "tests/test_compiled_closure.py" in modules.longer_tests("reference/kinematics.py")
+    assert not modules.longer_tests("metrics.py")
 
 
 def test_the_references_kernels_divide_by_zero_uncompiled_as_compiled(monkeypatch: pytest.MonkeyPatch) -> None:

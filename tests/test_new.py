@@ -21,6 +21,7 @@ def workbench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
 
 @pytest.mark.parametrize("joints", [("crank",), ("left", "right")])
 def test_what_it_writes_runs_at_once(workbench: Workbench, joints: tuple[str, ...]) -> None:
+    workbench.gather_evidence()
     options = [part for joint in joints for part in ("--actuated", joint)]
     done = workbench("new", "mine", *options, "--loops", str(len(joints)))
     assert done.code == 0, done.err
@@ -69,12 +70,13 @@ def test_a_beginning_in_another_language_gives_what_the_python_one_gives(workben
 
 def test_the_test_that_it_writes_passes_and_can_fail(workbench: Workbench) -> None:
     assert workbench("new", "mine").code == 0
-    done = pytest_in("mine")
-    assert "1 passed" in done.stdout, done.stdout + done.stderr
     # its bound, drawn to where a right formula belongs, does not hold for the sketch
-    test = Path("mine/test_mine.py")
-    test.write_text(test.read_text().replace("< 10.0", "< 1e-10"))
-    assert "1 failed" in pytest_in("mine").stdout
+    text = Path("mine/test_mine.py").read_text()
+    assert text.count("< 10.0") == 1
+    Path("mine/test_twin.py").write_text(text.replace("< 10.0", "< 1e-10"))
+    done = pytest_in("mine")
+    assert "1 failed, 1 passed" in done.stdout, done.stdout + done.stderr
+    assert "FAILED test_twin.py" in done.stdout
 
 
 def pytest_in(directory: str) -> subprocess.CompletedProcess[str]:

@@ -43,10 +43,19 @@ def mine(p, q, qd, qdd):
 """
 
 
+WITHOUT_REPORT = """
+import sys, workbench.report
+workbench.report.build_report = lambda directory: None
+from workbench.__main__ import main
+main()
+"""
+"""The command, which draws no figures: they take most of the time, and nothing here looks at them."""
+
+
 def called(folder: Path, arguments: list[str], inside: str = "pass", before: str = "") -> tuple[int, str, str]:
     (folder / "good.toml").write_text(HEAD + CANDIDATES + CASE)
     (folder / "f.py").write_text(FILE.format(inside=inside, before=before))
-    command = [sys.executable, "-P", "-m", "workbench", *arguments]
+    command = [sys.executable, "-P", "-c", WITHOUT_REPORT, *arguments]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
     return done.returncode, done.stdout, done.stderr
 
@@ -132,7 +141,8 @@ def test_a_library_that_exits_is_a_bad_input(tmp_path: Path) -> None:
 def test_the_twin_without_the_guard_passes_for_a_script(tmp_path: Path) -> None:
     bare = (
         "import contextlib, sys\nimport workbench.campaign.bounded_call as b\n"
-        "b.no_exit = contextlib.nullcontext\nfrom workbench.cli import main\n"
+        "b.no_exit = contextlib.nullcontext\nimport workbench.report\n"
+        "workbench.report.build_report = lambda directory: None\nfrom workbench.cli import main\n"
         f"sys.argv = {['workbench', *RUN]!r}\nmain()\n"
     )
     (tmp_path / "good.toml").write_text(HEAD + CANDIDATES + CASE)

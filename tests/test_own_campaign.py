@@ -43,6 +43,7 @@ def run(workbench: Workbench, code: str | None, campaign: str = CAMPAIGN, *optio
 
 
 def test_the_reference_alone(workbench: Workbench) -> None:
+    workbench.gather_evidence()
     done = workbench.run(CAMPAIGN, "--out", "out")
     assert done.code == 4, done.err  # nothing is judged
     found = wb.load_run("out")

@@ -8,8 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from floors import floors
 from small_campaign import CANDIDATES, CASE, HEAD
 from sweep_campaign import SWEEP
@@ -32,7 +30,13 @@ for name in ("setitimer", "SIGALRM", "SIGHUP", "ITIMER_REAL", "pthread_kill", "p
         delattr(signal, name)
 sys.modules["resource"] = None
 from workbench.cli import main
-main()
+for arguments in {commands!r}:
+    sys.argv = ["workbench", *arguments]
+    try:
+        main()
+    except SystemExit as stop:
+        if stop.code:
+            sys.exit(f"{{arguments[0]}} ends with exit code {{stop.code}}")
 """
 
 FORMULA = """
@@ -44,32 +48,29 @@ def mine(parameters, q, qd, qdd):
 """
 
 
-def run(place: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    code = WITHOUT.format(names=ONLY_SOMEWHERE)
-    return subprocess.run(
-        [sys.executable, "-c", code, *arguments], cwd=place, capture_output=True, text=True, timeout=300, check=False
-    )
-
-
-@pytest.mark.parametrize("options", [("--quick", "--candidates", "mine.py"), ()])
-def test_runs_work_without_what_only_some_systems_have(tmp_path: Path, options: tuple[str, ...]) -> None:
+def test_runs_and_sweeps_work_without_what_only_some_systems_have(tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(HEAD + CANDIDATES + CASE)
     (tmp_path / "mine.py").write_text(FORMULA)
-    done = run(tmp_path, "run", "small.toml", "--no-pictures", *options)
-    assert done.returncode == 0, done
-    assert run(tmp_path, "status", "reports/small").returncode == 0
-
-
-def test_sweeps_work_without_what_only_some_systems_have(tmp_path: Path) -> None:
     (tmp_path / "varied.toml").write_text(SWEEP.replace("samples = 40", "samples = 2"))
-    done = run(tmp_path, "run", "varied.toml", "--quick", "--jobs", "1", "--out", "swept")
+    commands = (
+        ("run", "small.toml", "--no-pictures", "--candidates", "mine.py"),
+        ("status", "reports/small"),
+        ("run", "varied.toml", "--quick", "--jobs", "1", "--out", "swept"),
+    )
+    code = WITHOUT.format(names=ONLY_SOMEWHERE, commands=commands)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
+    )
     assert done.returncode == 0, done
+    assert "reports/small (small): finished" in done.stdout
+    assert (tmp_path / "swept/sweep.json").is_file()
 
 
 def unguarded(source: str) -> list[str]:
     """Members that are used in a file where nothing asks whether they are there."""
-    used = {node.attr for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Attribute)}
-    asked = {node.value for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Constant)}
+    nodes = list(ast.walk(ast.parse(source)))
+    used = {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+    asked = {node.value for node in nodes if isinstance(node, ast.Constant)}
     names = (*ONLY_SOMEWHERE, "setitimer", "SIGHUP", "flock", "RLIMIT_AS")
     return [name for name in names if name in used and name not in asked and "import resource" not in source]
 

@@ -21,6 +21,7 @@ import pytest
 import own_mechanisms
 from small_campaign import SMALL, Workbench
 from workbench.errors import MissingExtraError, ModelError
+from workbench.rendering import drawing as film_drawing
 from workbench.rendering import run_pictures, system
 from workbench.rendering.poses import Poses, home_pose, motion_poses
 
@@ -297,6 +298,7 @@ def test_a_run_keeps_a_still_and_a_film_of_its_first_case(drawing: Workbench, mo
     from PIL import Image
 
     monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.setattr(run_pictures, "PATIENCE_S", 300.0)  # a busy machine draws no less
     assert drawing.run(SMALL, "--quick", "--out", "run").code == 0
     record = record_of(drawing, "run")
     assert (record["case"], record["note"]) == ("first", "")
@@ -327,7 +329,7 @@ def test_a_machine_that_cannot_draw_says_so_and_fails_no_run(
     drawing: Workbench, monkeypatch: pytest.MonkeyPatch, backend: str | None, said: str
 ) -> None:
     if backend:
-        monkeypatch.setattr(run_pictures, "needs", lambda *modules: None)
+        monkeypatch.setattr(film_drawing, "needs", lambda *modules: None)
         monkeypatch.setenv("MUJOCO_GL", backend)
     else:
         monkeypatch.setattr(system.importlib.util, "find_spec", lambda name: None)
@@ -343,15 +345,15 @@ def test_a_drawing_that_hangs_is_left_behind(
     # a directory of its own: other tests draw at the same time
     temporary = tmp_path_factory.mktemp("temporary")
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
-    monkeypatch.setattr(run_pictures, "needs", lambda *modules: None)
-    monkeypatch.setattr(run_pictures, "PATIENCE_S", 0.2)
+    monkeypatch.setattr(film_drawing, "needs", lambda *modules: None)
+    monkeypatch.setattr(film_drawing, "PATIENCE_S", 0.2)
     started: list[subprocess.Popen[bytes]] = []
 
     def hang(command: list[str], **options: Any) -> subprocess.Popen[bytes]:
         started.append(subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"]))
         return started[-1]
 
-    monkeypatch.setattr(run_pictures, "popen", hang)
+    monkeypatch.setattr(film_drawing, "popen", hang)
     done = drawing.run(SMALL, "--quick", "--out", "run")
     assert (done.code, done.complaint) == (0, [])
     assert record_of(drawing, "run")["note"] == "drawing took longer than 0.2 s"

@@ -40,6 +40,7 @@ def test_pdf_holds_pages_and_figures_without_pictures(run: Path, tmp_path: Path)
     assert not (again / "report.html").exists()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_pages_have_contents_links_and_the_size_that_is_asked_for(tmp_path: Path) -> None:
     folder = make_run(tmp_path / "run", cases=1, samples=20)
     sizes = {}
@@ -54,6 +55,7 @@ def test_pages_have_contents_links_and_the_size_that_is_asked_for(tmp_path: Path
         build_report(folder, ["pdf"], paper="a3")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_pdf_says_what_the_page_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def edit(manifest: dict[str, Any], rows: list[dict[str, Any]]) -> None:
         manifest["figures"][0]["not_about"] = "a2 0.2 -> 0.3 m (--set)"
@@ -135,6 +137,7 @@ def workbench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
     return made
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_command_rebuilds_what_is_asked_for(workbench: Workbench) -> None:
     folder = make_run(workbench.directory / "run", cases=1, samples=20)
     done = workbench("report", folder, "--format", "md")

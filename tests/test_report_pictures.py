@@ -19,6 +19,7 @@ def films(run: Path) -> list[dict[str, str]]:
     return [{name: value or "" for name, value in attributes.items()} for attributes in found]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_page_holds_the_stored_frames_in_the_case_that_they_show(tmp_path: Path) -> None:
     run = store_pictures(make_run(tmp_path / "run", samples=30))
     build_report(run, ["html", "md", "pdf"])
@@ -42,6 +43,7 @@ def test_the_page_holds_the_stored_frames_in_the_case_that_they_show(tmp_path: P
         ({"model_sha256": "0" * 63 + "1"}, "No rendered picture: the stored pictures show another model."),
     ],
 )
+@pytest.mark.usefixtures("undrawn")
 def test_without_pictures_the_drawing_stands_alone_and_the_reason_is_said(
     tmp_path: Path, changes: dict[str, str], said: str
 ) -> None:
@@ -54,6 +56,7 @@ def test_without_pictures_the_drawing_stands_alone_and_the_reason_is_said(
     assert "No rendered picture" in (run / "report.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_run_that_was_told_to_draw_none_does_not_speak_of_them(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", samples=30)
     build_report(run)
@@ -82,6 +85,7 @@ def disguise(run: Path) -> None:
         (disguise, "mechanism.webp: 24 bytes; allowed: a WebP picture"),
     ],
 )
+@pytest.mark.usefixtures("undrawn")
 def test_torn_pictures_give_one_line(tmp_path: Path, spoil: Callable[[Path], None], said: str) -> None:
     run = store_pictures(make_run(tmp_path / "run", cases=1, samples=20))
     spoil(run)

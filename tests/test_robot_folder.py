@@ -137,6 +137,7 @@ high = 0.6
 """
 
 
+@pytest.mark.usefixtures("inline_workers")
 def test_a_sweep_over_its_parameters(workbench: Workbench) -> None:
     """Rods that are shorter than the crank reaches do not close: the filter leaves them out."""
     first = CAMPAIGN[: CAMPAIGN.index('\n[[case]]\nname = "platform"')]

@@ -11,6 +11,7 @@ from workbench.cli import _run
 
 pytest.importorskip("pinocchio", reason="the extra pinocchio is not installed")
 
+pytestmark = pytest.mark.usefixtures("undrawn")
 AGREEMENT = 1e-10
 
 
@@ -18,8 +19,8 @@ AGREEMENT = 1e-10
 @pytest.mark.parametrize("campaign", ["almeida_2010", "garcia_murillo_2016"])
 def test_engines_agree_on_every_case(campaign: str, tmp_path: Path) -> None:
     out = tmp_path / campaign
-    code = _run(["run", f"campaigns/{campaign}.toml", "--out", str(out), "--engines", "mujoco,pinocchio", "--quick"])
-    assert code == 0
+    options = ["--engines", "mujoco,pinocchio", "--quick", "--no-pictures"]
+    assert _run(["run", f"campaigns/{campaign}.toml", "--out", str(out), *options]) == 0
     summary = pd.read_csv(out / "summary.csv")
     spread = summary.groupby("case")["engine_spread"].max()
     assert len(spread) >= 8
@@ -34,7 +35,7 @@ def test_engines_agree_on_every_case(campaign: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["fourbar", "fivebar", "delta", "bricard", "orthoglide"])
 def test_engines_agree_on_the_examples(repository: Path, tmp_path: Path, name: str) -> None:
     folder, out = repository / "examples" / name, tmp_path / "out"
-    options = ["--candidates", str(folder / f"{name}.py"), "--engines", "mujoco,pinocchio", "--quick"]
+    options = ["--candidates", str(folder / f"{name}.py"), "--engines", "mujoco,pinocchio", "--quick", "--no-pictures"]
     assert _run(["run", str(folder / f"{name}.toml"), "--out", str(out), *options]) == 0
     spread = pd.read_csv(out / "summary.csv")["engine_spread"]
     assert spread.notna().all()
@@ -66,7 +67,8 @@ def test_redundant_actuation_is_judged_by_power_and_replay_and_says_so(
     monkeypatch.chdir(tmp_path)
     Path("both.xml").write_text(PARALLELOGRAM)
     Path("both.toml").write_text(REDUNDANT)
-    assert _run(["run", "both.toml", "--out", "out", "--engines", "mujoco,pinocchio"]) == 4
+    command = ["run", "both.toml", "--out", "out", "--engines", "mujoco,pinocchio", "--no-pictures"]
+    assert _run(command) == 4
     case = wb.load_run("out").manifest.cases["swing"]
     assert case.evidence.power_balance["distributed"].relative < 1e-10
     assert case.evidence.replay
@@ -76,7 +78,7 @@ def test_redundant_actuation_is_judged_by_power_and_replay_and_says_so(
     assert "no second engine looks at them, and reactions are left out" in case.warnings[0]
     # twin: driven at one crank the same mechanism has both
     Path("both.toml").write_text(ONE_CRANK)
-    assert _run(["run", "both.toml", "--out", "out", "--engines", "mujoco,pinocchio"]) == 4
+    assert _run(command) == 4
     case = wb.load_run("out").manifest.cases["swing"]
     assert case.evidence.second_engine is not None
     assert case.peak_reactions

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ import workbench as wb
 from workbench.capabilities.robot import Robot
 from workbench.compiled import KERNEL_FILES
 from workbench.errors import ArrayError, MotionError, ParameterError
+from workbench.robots import kernel_call
 from workbench.robots.asym_2rss_ppap import kernel as asym_kernel
 from workbench.robots.blocks import BLOCK
 from workbench.robots.kernel_call import SAMPLES_PER_THREAD
@@ -89,6 +90,35 @@ def test_closed_forms_over_threads(robot: str, threads: int) -> None:
     q[-1, 1] = np.nan
     with pytest.raises(ArrayError, match=f"sample {len(q) - 1}, column 1 is nan"):
         mechanism.inverse_dynamics(q, qd, qdd, external_force=force, threads=threads)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 8])
+def test_as_many_threads_take_part_as_are_asked_for(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
+    """The same bits come of one thread: that others take part shows in nothing but time."""
+    asked: list[int] = []
+
+    class Pool:
+        def submit(self, share: Any) -> Any:
+            asked.append(share())
+            return SimpleNamespace(result=lambda found=asked[-1]: found)
+
+    def pool(workers: int) -> Pool:
+        assert workers == threads - 1
+        return Pool()
+
+    def kernel(c: Any, q: Any, qd: Any, qdd: Any, force: Any, tau: Any) -> int:
+        tau[:] = q + force
+        return len(q)
+
+    monkeypatch.setattr(kernel_call, "_pool", pool)
+    monkeypatch.setattr(kernel_call, "_ready", lambda kernel, dimensions: None)
+    q = np.arange(3.0 * threads * SAMPLES_PER_THREAD).reshape(-1, 3)
+    for force in (np.ones((1, 3)), q):
+        asked.clear()
+        tau = np.zeros_like(q)
+        assert kernel_call.fill_torques(kernel, np.zeros(1), q, q, q, force, tau, threads) == len(q)
+        assert len(asked) == threads - 1
+        assert np.array_equal(tau, q + force)
 
 
 @both_robots
@@ -390,6 +420,26 @@ def test_where_nothing_can_be_written_it_works_and_says_so(read_only_package: Pa
     notice, tau = use(read_only_package, nowhere)
     assert "not kept: no writable cache directory; set NUMBA_CACHE_DIR" in notice
     assert tau.startswith("TAU")
+
+
+def test_what_numba_makes_by_itself_is_no_first_use_and_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The constructor of a structure of arrays is a function of no module: whoever compiles one saw a traceback."""
+    from numba.core import event
+
+    from workbench import compiled
+
+    listening: list[Any] = []
+    monkeypatch.setattr(event, "register", lambda kind, listener: listening.append(listener))
+    said: list[str] = []
+    monkeypatch.setattr(compiled, "tell", said.append)
+    compiled._announce()
+    for module in (None, "of_a_user", "workbench.reference.rows", "workbench.reference.rows"):
+        kernel = FunctionType((lambda: None).__code__, {"__name__": module})
+        kernel.__module__ = module  # type: ignore[assignment]
+        listening[0].on_start(SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=kernel)}))
+    listening[0].on_start(SimpleNamespace(data={}))
+    assert len(said) == 1
+    assert said[0].startswith("compiling numerical kernels for this machine, once")
 
 
 def test_every_kernel_is_compiled_by_the_one_decorator() -> None:

@@ -141,6 +141,7 @@ def test_a_sweep_is_judged_by_the_same_words(counts: dict[str, int], bounded: bo
     assert conclude_sweep(counts, bounded).status == status
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_nothing_judged_is_said_alike_everywhere(workbench: Workbench, tmp_path: Path) -> None:
     campaign = HEAD + MINE + CASE + CLAIM
     done = workbench.run(campaign, "--quick", "--candidates", "mine.py", "--out", "run")
@@ -168,6 +169,7 @@ def test_nothing_judged_is_said_alike_everywhere(workbench: Workbench, tmp_path:
     assert workbench.run(judged, "--quick", "--candidates", "mine.py", "--out", "run").code == 1
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_claims_sources_and_rows_follow_the_robot(workbench: Workbench, tmp_path: Path) -> None:
     campaign = HEAD + CLAIM + CASE + '[[candidate]]\nname = "lumped"\nreference = "lumped"\nbound = 1e-10\n'
 
@@ -294,6 +296,7 @@ def test_a_larger_run_is_replaced_only_when_asked(workbench: Workbench, tmp_path
 def test_a_run_of_less_evidence_takes_the_place_of_more_only_when_asked(workbench: Workbench, tmp_path: Path) -> None:
     campaign = HEAD + CASE + '[[candidate]]\nname = "lumped"\nreference = "lumped"\nbound = 1e-10\n'
     options = ("--no-pictures", "--out", "run")
+    workbench.gather_evidence()
     assert workbench.run(campaign, *options).code == 0
     before = (tmp_path / "run/manifest.json").read_bytes()
     done = workbench.run(campaign, "--quick", *options)

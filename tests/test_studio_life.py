@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from small_campaign import Workbench
 from talking_process import TalkingProcess
 
 viser = pytest.importorskip("viser", reason="the extra studio is not installed")
@@ -150,12 +151,18 @@ def test_a_missing_extra_is_one_line_with_the_way_on() -> None:
         ((str(DELTA), "--host", "203.0.113.9"), "address of this machine"),
     ],
 )
-def test_bad_input_is_one_line(arguments: tuple[str, ...], said: str) -> None:
-    done = run("studio", *arguments)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert done.stdout == ""
+def test_bad_input_is_one_line(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    said: str,
+) -> None:
+    done = Workbench(tmp_path, monkeypatch, capsys)("studio", *arguments)
+    assert done.code == 2
+    assert said in done.err
+    assert len(done.complaint) == 1
+    assert done.out == ""
 
 
 def test_help_loads_no_viser() -> None:

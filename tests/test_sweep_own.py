@@ -66,6 +66,7 @@ def summary(directory: Path) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.usefixtures("inline_workers")
 def test_a_slow_formula_is_no_warning_that_a_sweep_stores(workbench: Workbench) -> None:
     """Whether a call took long depends on the machine's load; one such count made two equal sweeps differ."""
     workbench.write(FORMULA.replace("return", "__import__('time').sleep(0.2)\n    return"), "mine.py")
@@ -105,6 +106,7 @@ def test_a_formula_that_fails_fails_its_cases_with_its_own_line(workbench: Workb
     assert any("mine against distributed, crank: peak_error 1, bound 1e-10" in text for text in texts)
 
 
+@pytest.mark.usefixtures("inline_workers")
 def test_an_edited_formula_is_computed_again(workbench: Workbench) -> None:
     options = ("run", "sweep.toml", "--candidates", "mine.py", "--out", "out", "--jobs", "1")
     workbench.write(FORMULA, "mine.py")

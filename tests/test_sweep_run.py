@@ -598,11 +598,13 @@ def test_what_is_no_address_of_a_scheduler(workbench: Workbench) -> None:
     ]
 
 
+@pytest.mark.usefixtures("inline_workers")
 def test_one_case_of_a_sweep_by_itself_has_the_same_numbers_and_all_evidence(workbench: Workbench) -> None:
     name = workbench.write(SWEEP)
     assert workbench("run", name, "--out", "run", "--jobs", "1").code == 0
     errors = pd.read_parquet(workbench.directory / "run" / "summary")
     case = errors[errors["kind"] == "modelling"].sort_values("peak_error")["case"].iloc[-1]
+    workbench.gather_evidence()
     done = workbench("run", name, "--only", case)
     assert done.code == 0, done
     directory = workbench.directory / "reports" / "sweep-cases"

@@ -121,7 +121,8 @@ def _announce() -> None:
         def on_start(self, event: Any) -> None:
             dispatcher = event.data.get("dispatcher")
             kernel = getattr(dispatcher, "py_func", None)
-            if self.said or not getattr(kernel, "__module__", "").startswith("workbench."):
+            module = getattr(kernel, "__module__", None) or ""  # what numba makes by itself is of no module
+            if self.said or not module.startswith("workbench."):
                 return
             self.said = True
             place = getattr(getattr(dispatcher, "_cache", None), "cache_path", None)

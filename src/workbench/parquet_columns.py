@@ -21,7 +21,8 @@ def column_bytes(columns: Mapping[str, FloatArray]) -> bytes:
     """Return a Parquet file of some columns ``(n,)``, NaN as a gap; the same numbers give the same bytes."""
     table = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
     buffer = pa.BufferOutputStream()  # Arrow opens no file whose name is not UTF-8
-    pq.write_table(table, buffer, write_page_checksum=True)
+    # a dictionary of numbers that hardly repeat makes files larger and takes most of the time
+    pq.write_table(table, buffer, use_dictionary=False, write_page_checksum=True)
     content: bytes = buffer.getvalue().to_pybytes()
     return content
 
@@ -83,13 +84,14 @@ def _judged(
     indices: Collection[str],
     rows: int | None,
 ) -> list[str]:
-    known = file.schema_arrow.names
+    schema = file.schema_arrow  # made anew whenever it is asked for
+    known = schema.names
     chosen = list(known if names is None else names)
     for name in chosen:
         if known.count(name) != 1:
             found = f"stands {known.count(name)} times" if name in known else "is missing"
             raise OutputError(f'{path}: column "{name[:60]}" {found}', column=name)
-        kind = file.schema_arrow.field(name).type
+        kind = schema.field(name).type
         if name in texts:
             fits, allowed = _is_text(kind.value_type if pa.types.is_dictionary(kind) else kind), "texts"
         elif name in indices:

@@ -24,8 +24,9 @@ CORE_TESTS = (
     "mjcf_assumptions", "mjcf_edit", "mjcf_roundtrip",
     "mjcf_safety", "mjcf_setup", "mjcf_source", "model_command", "models", "motion_along", "motion_platform",
     "negative_controls", "own_campaign", "own_reference", "pinocchio_reference", "planar_4rprp", "planar_4rprp_model",
-    "platform_side", "random_robots", "reactions", "recorded", "reference_closure", "reference_dynamics",
-    "reference_evidence", "reference_linear", "refusals", "robot_file", "robot_folder", "screws",
+    "plant_terms", "platform_side", "random_robots", "reactions", "recorded", "reference_closure",
+    "reference_dynamics", "reference_evidence", "reference_linear", "reference_thresholds", "refusals",
+    "robot_file", "robot_folder", "screws", "shelf",
     "second_engine_campaigns", "sides", "speed_semantics", "task_coordinates", "terms", "tolerances", "urdf",
     "user_kinematics", "verdict",
 )  # fmt: skip
@@ -46,7 +47,7 @@ KERNEL_TESTS: dict[str, tuple[str, ...]] = {
 INTERPRETED_TESTS = ("reference_linear", "closure_kinds", "own_reference", "reactions", "idle_rods", "task_coordinates")
 """Small enough to run with all kernels uncompiled."""
 
-LOOPS = ("closure_kinds", "own_reference", "idle_rods", "reactions")
+LOOPS = ("closure_kinds", "own_reference", "idle_rods", "reactions", "reference_thresholds")
 """Tests of all that closes loops; they take seconds, also uncompiled."""
 
 SHORT_TESTS: dict[str, tuple[str, ...]] = {
@@ -60,7 +61,9 @@ SHORT_TESTS: dict[str, tuple[str, ...]] = {
     "mjcf/": ("mjcf_setup", "mjcf_source", "mjcf_edit", "mjcf_safety", "mjcf_roundtrip"),
     "robots/asym_2rss_ppap/literal": ("asym_literal",),
     "robots/asym_2rss_ppap/mobility": ("asym_mobility", "mjcf_assumptions"),
+    "robots/asym_2rss_ppap/kernel": ("asym_kernel", "asym_literal", "friction", "speed_semantics"),
     "robots/asym_2rss_ppap/": ("asym_kernel", "asym_literal", "friction"),
+    "robots/planar_4rprp/kernel": ("planar_4rprp", "planar_4rprp_model", "friction", "speed_semantics"),
     "robots/planar_4rprp/": ("planar_4rprp", "planar_4rprp_model", "friction"),
     "robots/screws": ("screws", "planar_4rprp", "asym_mobility"),
     "robots/sine_cosine": ("speed_semantics", "asym_kernel"),
@@ -81,17 +84,17 @@ SHORT_TESTS: dict[str, tuple[str, ...]] = {
     "reference/body_": ("terms", "counted_forces"),
     "reference/check": ("mjcf_assumptions", "own_reference"),
     "reference/continuation": ("closure_kinds", "reference_closure", "motion_along"),
-    "reference/crossings": ("importing",),
-    "reference/forward": ("control_plant",),
+    "reference/crossings": ("reference_thresholds", "importing"),
+    "reference/forward": ("plant_terms", "control_routes"),
     "reference/left_o": ("refusals", "importing", "tolerances", "idle_rods"),
     "reference/linear": ("reference_linear", "closure_kinds"),
-    "reference/pinocchio": ("pinocchio_reference", "sides", "second_engine_campaigns"),
+    "reference/pinocchio": ("reference_thresholds", "pinocchio_reference", "sides", "second_engine_campaigns"),
     "reference/platform_": ("task_coordinates", "platform_side"),
     "reference/power": ("reference_evidence", "counted_forces"),
     "reference/regressor": ("terms",),
     "reference/replay": ("counted_forces", "reference_evidence"),
     "reference/rods": ("idle_rods", "reference_closure"),
-    "reference/shelf": ("variants",),
+    "reference/shelf": ("shelf", "variants"),
     "reference/sides": ("sides",),
     "reference/skeleton": ("report_skeleton",),
     "reference/stiff_plant": ("control_plant",),
@@ -106,20 +109,39 @@ SHORT_TESTS: dict[str, tuple[str, ...]] = {
 """Beginnings of names of files, the first that fits: the test files of a short run, which looks at no map of lines."""
 
 UNCOMPILED_TESTS: dict[str, tuple[str, ...]] = {
-    "reference/forward": ("control_plant",),
+    "reference/forward": ("plant_terms",),
     "reference/linear": ("reference_linear", "closure_kinds"),
     "reference/platform_": ("task_coordinates",),
     "reference/sides": ("sides",),
-    "reference/task_rows": ("task_coordinates",),
+    "reference/task_rows": ("seen_from_the_base", "task_coordinates"),
     "reference/": LOOPS,
 }  # fmt: skip
 """The same for the reference's kernels, which are left uncompiled."""
+
+LONGER_TESTS: dict[str, tuple[str, ...]] = {
+    "reference/forward": ("control_plant", "control_routes"),
+    "reference/pinocchio": (),
+    "reference/platform_": ("task_coordinates", "platform_side"),
+    "reference/stiff_plant": ("control_routes", "control_plant"),
+    "reference/survey": (),
+    "reference/task": ("seen_from_the_base", "task_coordinates", "platform_side"),
+    "reference/": ("compiled_closure", "reference_closure", "motion_along", "reference_linear", "counted_forces"),
+}  # fmt: skip
+"""Test files that what survives a short run has to survive as well, compiled and however long a test takes."""
 
 
 def short_tests(module: str) -> list[str]:
     """Test files of a short run."""
     table = UNCOMPILED_TESTS if is_kernel(module) and module.startswith("reference/") else SHORT_TESTS
     return [test_file(name) for name in next(tests for start, tests in table.items() if module.startswith(start))]
+
+
+def longer_tests(module: str) -> list[str]:
+    """Test files for what survives those of a short run; none but for the reference."""
+    for start, tests in LONGER_TESTS.items():
+        if module.startswith(start):
+            return list(dict.fromkeys([*map(test_file, tests), *short_tests(module)]))
+    return []
 
 
 def files_of(group: str) -> list[str]:

@@ -14,10 +14,10 @@ KNOWN = tree.COPY.parent / "short.json"
 GIVEN_LIMIT = 900
 """seconds of the processor for one test file without a fault"""
 QUICK, LONGEST = 0.3, 3.0
-"""seconds; what takes less than the first goes first, what takes more than the second is left out"""
+"""seconds; what takes less than the first goes first, what takes more than the second is left out unless asked for"""
 
 
-def tests_of(files: tuple[str, ...], uncompiled: bool) -> tuple[list[str], float, list[str]]:
+def tests_of(files: tuple[str, ...], uncompiled: bool, longest: float) -> tuple[list[str], float, list[str]]:
     """Tests of these files that pass without a fault, and what they take.
 
     Quick ones first, within a file the fastest first; files stay together, since a fixture of a module is made anew
@@ -27,7 +27,7 @@ def tests_of(files: tuple[str, ...], uncompiled: bool) -> tuple[list[str], float
     for file in files:
         durations, failed = _without_fault(file, uncompiled)
         failing += failed
-        passing = [test for test in durations if test not in failed and durations[test] <= LONGEST]
+        passing = [test for test in durations if test not in failed and durations[test] <= longest]
         for test in sorted(passing, key=lambda test: (durations[test], test)):
             (quick if durations[test] < QUICK else slow).append(test)
             total += durations[test]

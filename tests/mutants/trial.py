@@ -162,6 +162,7 @@ def interpret() -> None:
     from types import SimpleNamespace
 
     import numpy as np
+    from numba.experimental import structref
 
     from workbench import compiled
 
@@ -183,6 +184,19 @@ def interpret() -> None:
 
     for name in ("compiled", "inlined", "merged"):
         setattr(compiled, name, plain_or(getattr(compiled, name)))
+
+    class Plain:
+        """Arrays held together for machine code, as Python holds them."""
+
+        fields: tuple[str, ...] = ()
+
+        def __init__(self, *values: Any) -> None:
+            for field, value in zip(self.fields, values, strict=True):
+                setattr(self, field, value)
+
+    structref.StructRefProxy = Plain
+    structref.register = lambda kind: kind
+    structref.define_proxy = lambda proxy, kind, fields: setattr(proxy, "fields", tuple(fields))
 
 
 def stamp_by_parts(package: Path) -> None:

@@ -58,13 +58,18 @@ class Changes:
         """Sources of the changed numbers of one case, by parameter."""
         return {change.name: change.by for change in self.of(case)}
 
-    def why_not(self, case: str, besides: Sequence[str] = ()) -> str:
+    def why_not(self, case: str, besides: Sequence[str] = (), known: Mapping[str, float] | None = None) -> str:
         """Why a statement about the robot is none about this case's, in words; empty where it is.
 
-        *besides* holds ways of changing a number that the statement takes into account.
+        *besides* holds ways of changing a number that the statement takes into account, *known* numbers that it names.
         """
         said = [self.model] if self.model else []
-        said += [said_of(change) for change in self.of(case) if change.by not in besides]
+        named = known or {}
+        said += [
+            said_of(change)
+            for change in self.of(case)
+            if change.by not in besides and named.get(change.name) != change.after
+        ]
         return few(said)
 
 

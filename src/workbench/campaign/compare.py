@@ -154,7 +154,7 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for point, place in drawing.points.items():
             drawn_columns |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
-        columns, spent = spent_on(case, reference, next(iter(results)))
+        columns, spent = spent_on(case, reference, next(iter(results)), first)
         drawn_columns |= columns
         if spent:
             facts["spent"] = spent
@@ -223,8 +223,9 @@ def _raw_rows(
     motion = case.motion
     name = "distributed" if "distributed" in results else next(iter(results))
     spec = CandidateSpec(name=RAW_NAME, reference=name)
-    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force, motion.t)
-    rows = _rows(case, spec, tau, results[name], evidence, felt)
+    result = results[name]
+    tau = raw_mj_inverse(reference, motion.q, motion.qd, motion.qdd, name, case.force, motion.t, known=result)
+    rows = _rows(case, spec, tau, result, evidence, felt)
     return [dataclasses.replace(row, candidate=RAW_INVERSE, kind=CONTRAST) for row in rows]
 
 

@@ -67,6 +67,8 @@ class ControlClaim(Strict):
     """empty is all"""
     speeds: list[Positive] = Field(default_factory=list)
     """empty is all; for ``enough-but-fast`` those that count as fast"""
+    parameters: dict[str, float] = Field(default_factory=dict)
+    """numbers of a case that the sentence is about, too: a load that a robot carries makes it no other robot"""
     note: str = ""
     """remark in the report"""
 

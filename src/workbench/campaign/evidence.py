@@ -20,7 +20,7 @@ from workbench.campaign.user_candidates import UserCandidate
 from workbench.errors import CandidateError, MotionError, SpecError, did_you_mean
 from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.left_open import left_open
-from workbench.reference.power import PowerBalance, power_balance
+from workbench.reference.power import PowerBalance, displaced_samples, power_balance
 from workbench.reference.replay import Replay, ReplaySet, replay
 
 MUJOCO = "mujoco"
@@ -158,8 +158,12 @@ def gather_evidence(
     left_open = {name: found for name, found in left_open.items() if found}
     if not effort.budget:
         return Evidence(spread=spread, undetermined=left_open, times=motion.t)
+    first = next(iter(results.values()))
+    displaced = displaced_samples(reference, first.qpos, motion.q, motion.qd, motion.qdd)
     power = {
-        name: power_balance(reference, motion.q, motion.qd, motion.qdd, name, force, tau=result.tau, along=motion.t)
+        name: power_balance(
+            reference, motion.q, motion.qd, motion.qdd, name, force, along=motion.t, known=result, displaced=displaced
+        )
         for name, result in results.items()
     }
     return Evidence(power, spread, _replays(case, reference, candidates), left_open, motion.t)

@@ -18,6 +18,7 @@ from workbench.campaign.claims import judge_claims
 from workbench.campaign.compare import RAW_DESCRIPTION, RAW_INVERSE, CaseResult, Row, compute_case
 from workbench.campaign.conclusion import CaseOutcome, Conclusion, case_status, conclude
 from workbench.campaign.cost import cost_us
+from workbench.campaign.drawn import CaseDrawing, case_to_draw
 from workbench.campaign.evidence import FULL, Effort, check_engines
 from workbench.campaign.figure_spec import FigureSpec
 from workbench.campaign.lock import locked
@@ -89,6 +90,7 @@ def run_campaign(
     progress: Progress | None = None,
     report: Callable[[Path], object] | None = None,
     pictures: Pictures | None = None,
+    drawing: CaseDrawing | None = None,
     effort: Effort = FULL,
     candidates: Sequence[Formula] = (),
     pick: Pick | None = None,
@@ -121,6 +123,8 @@ def run_campaign(
         Called with the directory when the results stand in it, before it is moved to its place.
     pictures
         Draws the robot of the first case while the others are computed.
+    drawing
+        Draws the figures of each case while the next ones are computed; *report* then takes them from it.
     effort
         How much evidence is gathered beside the errors, and with which engines.
     candidates
@@ -180,7 +184,10 @@ def run_campaign(
         locked(directory),
         staged(directory, alone=True) as stage,
         closing(pictures) if pictures else nullcontext(),
+        closing(drawing) if drawing else nullcontext(),
     ):
+        known = {case.name for case in cases} | {one.spec.name for one in missing}
+        names = [case.name for case in campaign.case if case.name in known]
         for number, case in enumerate(cases):
             if progress:
                 progress(case.name, number, len(cases))
@@ -193,6 +200,8 @@ def run_campaign(
                 continue
             results.append(result)
             store.write_series(stage, case.name, result.series)
+            if drawing:
+                drawing.case(case_to_draw(campaign, case.robot, names, _judged(result), result.rows, stage))
             if pictures and len(results) == 1:
                 pictures.start(result)
         if progress:

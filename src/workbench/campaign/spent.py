@@ -9,15 +9,17 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.campaign.cases import Case
 from workbench.errors import ParameterError
-from workbench.reference import MujocoReference
+from workbench.reference import MujocoReference, ReferenceResult
 from workbench.reference.terms import torque_terms
 
 MOST_SAMPLES = 5000
 """Of a longer case nothing is stored: 0.1 ms a sample, and more than a figure shows."""
 
 
-def spent_on(case: Case, reference: MujocoReference, mass_model: str) -> tuple[dict[str, FloatArray], dict[str, Any]]:
-    """Take the reference's torques of a case apart.
+def spent_on(
+    case: Case, reference: MujocoReference, mass_model: str, result: ReferenceResult
+) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    """Take the reference's torques of a case apart; *result* is what it gave under *mass_model*.
 
     Returns
     -------
@@ -30,7 +32,7 @@ def spent_on(case: Case, reference: MujocoReference, mass_model: str) -> tuple[d
     if reference.excess_actuators or len(motion.t) > MOST_SAMPLES:
         return {}, {}
     try:
-        terms = torque_terms(reference, motion.q, motion.qd, motion.qdd, mass_model, case.force, motion.t)
+        terms = torque_terms(reference, motion.q, motion.qd, motion.qdd, mass_model, case.force, motion.t, known=result)
     except ParameterError:  # a summand that has no name here: no parts rather than parts that do not add up
         return {}, {}
     parts = {key[0]: tau for key, tau in terms.by("part").items()}

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import io
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,20 +42,27 @@ def write_series(stage: Path, case: str, columns: Mapping[str, FloatArray]) -> N
     (folder / f"{case}.parquet").write_bytes(column_bytes(columns))
 
 
-def write_summary(stage: Path, rows: list[Row], changed: Collection[str] = (), good: float | None = None) -> None:
-    """Write ``summary.csv``; floats in their shortest form that reads back bit-equal.
+def write_summary(stage: Path, rows: Sequence[Row], changed: Collection[str] = (), good: float | None = None) -> None:
+    """Write ``summary.csv``, the text of `summary_text`."""
+    with (stage / SUMMARY).open("w", encoding="utf-8", newline="") as file:
+        file.write(summary_text(rows, changed, good))
+
+
+def summary_text(rows: Sequence[Row], changed: Collection[str] = (), good: float | None = None) -> str:
+    """Return what ``summary.csv`` holds; floats in their shortest form that reads back bit-equal.
 
     *changed* names the cases whose robot is not the one that the campaign's claims and sources are about; *good*
     is the accuracy that is wanted of formulas without a bound.
     """
     names = [field.name for field in dataclasses.fields(Row)]
-    with (stage / SUMMARY).open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow([*names, "robot", "good_enough"])
-        for row in rows:
-            robot = "changed" if row.case in changed else "published"
-            cells = [*(getattr(row, name) for name in names), robot, good_enough(row, good)]
-            table.writerow([_cell(cell) for cell in cells])
+    text = io.StringIO(newline="")
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow([*names, "robot", "good_enough"])
+    for row in rows:
+        robot = "changed" if row.case in changed else "published"
+        cells = [*(getattr(row, name) for name in names), robot, good_enough(row, good)]
+        table.writerow([_cell(cell) for cell in cells])
+    return text.getvalue()
 
 
 def _cell(value: Any) -> Any:
@@ -64,9 +72,13 @@ def _cell(value: Any) -> Any:
 
 
 def write_manifest(stage: Path, manifest: Mapping[str, Any]) -> None:
-    """Write ``manifest.json``; numbers that are not finite become null, since JSON has no word for them."""
-    text = json.dumps(_plain(manifest), indent=1, ensure_ascii=False, allow_nan=False)
-    (stage / MANIFEST).write_text(text + "\n", encoding="utf-8")
+    """Write ``manifest.json``, the text of `manifest_text`."""
+    (stage / MANIFEST).write_text(manifest_text(manifest), encoding="utf-8")
+
+
+def manifest_text(manifest: Mapping[str, Any]) -> str:
+    """Return what ``manifest.json`` holds; numbers that are not finite become null: JSON has no word for them."""
+    return json.dumps(_plain(manifest), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _plain(value: Any) -> Any:

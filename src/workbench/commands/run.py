@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -102,16 +101,7 @@ def run(
     Exit code 0: every bound holds; 1: a bound fails or cannot be decided, or a case could not be computed; 2: bad
     input; 4: nothing was held against a bound, so nothing is judged.
     """
-    from workbench.campaign.asked import with_good
-    from workbench.campaign.run import run_campaign
     from workbench.campaign.spec import campaign_names, load_campaign
-    from workbench.commands.sweeps import dry_run as print_dry_run
-    from workbench.commands.sweeps import report_apart, run_and_print
-    from workbench.console import print_outcome
-    from workbench.sweep.computing import SweepInterrupted
-    from workbench.sweep.pick import pick_cases
-    from workbench.sweep.resumable import SweepOptions
-    from workbench.terminal import CaseProgress
 
     if robots:
         others: dict[str, object] = {
@@ -130,11 +120,13 @@ def run(
     if campaign is None:
         raise SpecError(f"which CAMPAIGN? A TOML file, or one that comes along: {', '.join(campaign_names())}")
     values, relative = settings(set_ or [])
-    effort = _effort(engines, quick)
     command = ["workbench", *sys.argv[1:]]
     spec, file = load_campaign(campaign)
     if spec.control is not None:
         from workbench.commands.studies import dry_run_study, refuse_options, run_study_and_print
+        from workbench.commands.sweeps import report_apart
+        from workbench.sweep.computing import SweepInterrupted
+        from workbench.sweep.resumable import SweepOptions
 
         given = {"only": only, "good": good, "relative": relative}
         given |= {"quick": quick, "keep_going": keep_going, "engines": engines != "mujoco"}
@@ -154,6 +146,7 @@ def run(
                 candidates=candidates or (),
                 controllers=controllers or (),
                 report=report_apart,
+                pictures=pictures,
             )
         except SweepInterrupted as stop:
             typer.echo(f"workbench: {stop}", err=True)
@@ -168,55 +161,54 @@ def run(
         raise SpecError(f"{campaign}: --set NAME*=FACTOR does not go with {'--dry-run' if dry_run else 'a sweep'}")
     if sweep and good is not None:
         raise SpecError(f"{campaign}: --good {good:g}: a sweep counts its designs by sweep.good of the campaign")
-    spec = with_good(spec, good)
+    if not sweep and not dry_run:
+        from workbench.commands.run_cases import run_cases_and_print
+
+        code = run_cases_and_print(
+            spec,
+            campaign,
+            lambda: _effort(engines, quick),
+            pictures=pictures,
+            out=out,
+            model=model,
+            only=only or (),
+            settings=values,
+            relative=relative,
+            command=command,
+            candidates=candidates or (),
+            keep_going=keep_going,
+            replace=replace,
+            good=good,
+        )
+        if code:
+            raise typer.Exit(code)
+        return
+    from workbench.campaign.asked import with_good
+    from workbench.commands.sweeps import dry_run as print_dry_run
+    from workbench.commands.sweeps import report_apart, run_and_print
+    from workbench.sweep.computing import SweepInterrupted
+    from workbench.sweep.resumable import SweepOptions
+
+    spec, effort = with_good(spec, good), _effort(engines, quick)
     if dry_run:
         print_dry_run(spec, file, model, values, effort, jobs, candidates or (), only or (), keep_going)
         return
-    if sweep:
-        try:
-            code = run_and_print(
-                spec,
-                file,
-                out,
-                model=model,
-                settings=values,
-                command=command,
-                effort=effort,
-                options=SweepOptions(jobs, scheduler, fresh, retry_failed, replace),
-                candidates=candidates or (),
-                report=report_apart,
-            )
-        except SweepInterrupted as stop:
-            typer.echo(f"workbench: {stop}", err=True)
-            raise
-    else:
-        from workbench.diagnosis.brief import brief
-        from workbench.processes import cores
-        from workbench.rendering.run_pictures import RunPictures
-        from workbench.report import build_report
-
-        with CaseProgress() as progress:
-            outcome = run_campaign(
-                campaign,
-                out,
-                model=model,
-                only=only or (),
-                settings=values,
-                relative=relative,
-                command=command,
-                progress=progress,
-                report=build_report,
-                pictures=RunPictures() if pictures else None,
-                effort=dataclasses.replace(effort, threads=cores()),  # one case after the other: each may take all
-                candidates=candidates or (),
-                pick=pick_cases,
-                explain=brief,
-                keep_going=keep_going,
-                replace=replace,
-                good=good,
-            )
-        print_outcome(outcome)
-        code = outcome.conclusion.exit_code
+    try:
+        code = run_and_print(
+            spec,
+            file,
+            out,
+            model=model,
+            settings=values,
+            command=command,
+            effort=effort,
+            options=SweepOptions(jobs, scheduler, fresh, retry_failed, replace),
+            candidates=candidates or (),
+            report=report_apart,
+        )
+    except SweepInterrupted as stop:
+        typer.echo(f"workbench: {stop}", err=True)
+        raise
     if code:
         raise typer.Exit(code)
 

@@ -11,13 +11,14 @@ from rich.table import Table
 from rich.text import Text
 
 from workbench.campaign.spec import Campaign
-from workbench.commands.sweeps import SweepProgress, duration, size
+from workbench.commands.sweeps import WRITING, SweepProgress, duration, size
 from workbench.console import print_changes, print_conclusion
 from workbench.control.estimate import estimate_study
 from workbench.control.files import STUDY
 from workbench.control.plan import pairs_of
 from workbench.control.run import StudyOutcome, run_study
 from workbench.errors import SpecError
+from workbench.rendering import tracking_film
 from workbench.sweep.resumable import SweepOptions
 from workbench.terminal import out
 
@@ -75,6 +76,7 @@ def run_study_and_print(
     command: list[str],
     options: SweepOptions,
     report: Callable[[Path], object],
+    pictures: bool,
     candidates: Sequence[str | Path] = (),
     controllers: Sequence[str | Path] = (),
 ) -> int:
@@ -88,7 +90,8 @@ def run_study_and_print(
             settings=settings,
             command=command,
             show=progress,
-            report=report,
+            report=progress.saying(WRITING, report),
+            film=progress.saying("drawing the film", tracking_film.draw_tracking) if pictures else None,
             options=options,
             candidates=candidates,
             controllers=controllers,

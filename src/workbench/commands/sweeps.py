@@ -6,6 +6,7 @@ import subprocess
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import ParamSpec, TypeVar
 
 from rich import box
 from rich.progress import TextColumn
@@ -25,7 +26,11 @@ from workbench.sweep.resumable import SweepOptions
 from workbench.sweep.run import SweepOutcome, run_sweep
 from workbench.terminal import LINE_EVERY_S, Bar, err, out
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
 SHOWN_DRIVERS = 6
+WRITING = "writing the report"
 
 
 def duration(seconds: float) -> str:
@@ -69,6 +74,18 @@ class SweepProgress(Bar):
         elif time.monotonic() - self._said >= LINE_EVERY_S or (found.done == found.total != self._last):
             self._said, self._last = time.monotonic(), found.done
             err.print(plain_line(found, self._what), markup=False)
+
+    def saying(self, what: str, does: Callable[P, R]) -> Callable[P, R]:
+        """Return *does*, which says *what* is being done when it is called: all is computed then."""
+
+        def said(*arguments: P.args, **named: P.kwargs) -> R:
+            if err.is_terminal:
+                self._bar.update(self._task, note=what)
+            else:
+                err.print(what)
+            return does(*arguments, **named)
+
+        return said
 
 
 def dry_run(
@@ -128,7 +145,7 @@ def run_and_print(
             effort=effort,
             options=options,
             candidates=candidates,
-            report=report,
+            report=progress.saying(WRITING, report),
         )
     print_sweep(outcome)
     return outcome.conclusion.exit_code

@@ -13,14 +13,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from workbench.campaign.control_spec import PRINTED_COST, ControlClaim, ControlSpec
-from workbench.control.names import NOT_RUN
+from workbench.control.names import NOT_RUN, ROUTES
 from workbench.control.plan import Loop
 
 HOLDS, REFUTED, UNDECIDED = "holds", "does not hold", "cannot be decided"
 NOT_ABOUT = "not about this robot"
-
-ROUTES = ("rms", "rms_halved", "rms_second")
-"""Columns of the platform's error: the plant's step, half of it, MuJoCo's route."""
 
 MANY = 2.0
 """Shares beyond this read better as so many times the error."""
@@ -231,16 +228,15 @@ JUDGES: Mapping[str, Judge] = {
 }  # fmt: skip
 
 
-def judged(spec: ControlSpec, runs: Sequence[Known], others: Mapping[str, str] | None = None) -> list[Verdict]:
-    """Judge every claim of a study, and each again with step, integrator and gains varied.
+NotAbout = Callable[[ControlClaim], str]
+"""Why a claim is not about the robots of its cases; empty where it is."""
 
-    *others* says, by case, in what its robot is another than the one that claims are about: those are not judged.
-    """
+
+def judged(spec: ControlSpec, runs: Sequence[Known], not_about: NotAbout = lambda claim: "") -> list[Verdict]:
+    """Judge every claim of a study that is about its robots, and each again with step, integrator and gains varied."""
     found = []
     for claim in spec.claim:
-        why = [said for case, said in (others or {}).items() if not claim.cases or case in claim.cases]
-        if why:
-            said = "; ".join(dict.fromkeys(why))
+        if said := not_about(claim):
             found.append(Verdict(claim.id, claim.text, claim.source, NOT_ABOUT, said, {}, ""))
             continue
         judge = JUDGES[claim.kind]

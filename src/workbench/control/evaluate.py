@@ -25,7 +25,7 @@ from workbench.control.loop import TRACKED, Tracked, run_loop
 from workbench.control.models import FormulaModel
 from workbench.control.names import NOT_RUN
 from workbench.control.plan import Loop, StudyPlan, case_at, delay_of, overrides_of, plan_study, torque_limits
-from workbench.control.routes import Outcome, by_routes
+from workbench.control.routes import Outcome, Run, by_routes, is_halved, step_of
 from workbench.control.sampling import Desired, Sampling, as_measured, desired_at_ticks
 from workbench.control.user_controller import UserController, load_controllers
 from workbench.errors import WorkbenchError
@@ -179,17 +179,38 @@ def compute(study: Study, loop: Loop) -> Outcome:
     """
     spec, bench = study.plan.spec, study.bench(loop)
     desired, x_desired = bench.desired(loop.rate)
-    sampling = study.sampling(bench, loop)
+    run = _run_of(study, loop)
+
+    def error(q: FloatArray, x: FloatArray) -> Error:
+        return error_of(q, desired.q, x, x_desired)
+
+    stiff = bench.stiff if spec.second_route == "all" else None
+    halve = is_halved(loop.rate, loop.rate_asked)
+    return by_routes(bench.plant, stiff, run, error, 1.0 / loop.rate, spec.step, halve)
+
+
+def track(study: Study, loop: Loop) -> Tracked:
+    """Run a loop by the package's route alone.
+
+    Raises
+    ------
+    WorkbenchError
+        As `compute`.
+    """
+    step = step_of(1.0 / loop.rate, study.plan.spec.step)
+    return _run_of(study, loop)(study.bench(loop).plant, step, 1)
+
+
+def _run_of(study: Study, loop: Loop) -> Run:
+    """What runs a loop: with either plant, in steps of a length."""
+    bench = study.bench(loop)
+    desired, sampling = bench.desired(loop.rate)[0], study.sampling(bench, loop)
     seen = as_measured(desired, sampling)
 
     def run(plant: Plant | StiffPlant, step: float, times: int) -> Tracked:
         return run_loop(plant, study.law(bench, loop, seen), desired, sampling, step, times)
 
-    def error(q: FloatArray, x: FloatArray) -> Error:
-        return error_of(q, desired.q, x, x_desired)
-
-    both = spec.second_route == "all"
-    return by_routes(bench.plant, bench.stiff if both else None, run, error, sampling.period, spec.step)
+    return run
 
 
 def _packed(study: Study, common: str, task: tuple[int, Loop]) -> Packed:

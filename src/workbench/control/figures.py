@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.control.names import ROUTES
 
 DECIDED = 0.1
 """A figure is undecided where it is not known to a tenth of itself."""
@@ -39,6 +42,17 @@ def extrapolated(coarse: FloatArray, fine: FloatArray) -> FloatArray:
     """Coordinates at a step of zero, from those of a method of first order at a step and at its half."""
     found: FloatArray = 2.0 * fine - coarse
     return found
+
+
+def errors_in(row: Mapping[str, Any]) -> dict[str, float]:
+    """The platform's rms error by each route that was taken, m."""
+    return {route: row[route] for route in ROUTES if row.get(route) is not None}
+
+
+def uncertainty_of(errors: Mapping[str, float]) -> float:
+    """How well an error is known, m: the largest difference between routes and steps; NaN where there is one alone."""
+    first, *others = ROUTES
+    return max((abs(errors[name] - errors[first]) for name in others if name in errors), default=math.nan)
 
 
 def is_decided(value: float, uncertainty: float) -> bool:

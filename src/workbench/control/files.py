@@ -24,7 +24,7 @@ NUMBERS = frozenset({"speed", "rate", "bandwidth", *FACTS, *ERROR_COLUMNS[1:]})
 STUDY = Resumable(
     what="study",
     parts="runs",
-    finished=(files.STATE, CONTROL, RUNS, ERRORS, JOURNAL, store.MANIFEST, *store.REPORTS),
+    finished=(files.STATE, CONTROL, RUNS, ERRORS, JOURNAL, store.MANIFEST, store.PICTURES, *store.REPORTS),
     results=RUNS,
 )
 

@@ -12,5 +12,11 @@ ERROR_COLUMNS = (
 )  # fmt: skip
 """What a row of a run holds; see docs/control.md."""
 
+ROUTES = ("rms", "rms_halved", "rms_second")
+"""Columns of an error: by the plant's step, by half of it, by MuJoCo's route."""
+
+TRACKING = "tracking.json"
+"""Beside the pictures of a film: what it shows."""
+
 NOT_RUN = "not run"
 """In place of a verdict or a status: nobody computed it."""

@@ -104,10 +104,11 @@ def plan_study(
         for case in one.cases:
             if case not in [c.name for c in campaign.case]:
                 raise SpecError(f'{where}: claim "{one.id}": no case "{case}"')
-    try:
-        robot.description.table.changed(robot.values, spec.plant)
-    except WorkbenchError as error:
-        raise SpecError(f"{where}.plant: {error}", file=str(file), key="plant") from error
+    for key, numbers in (("plant", spec.plant), *((f'claim "{one.id}"', one.parameters) for one in spec.claim)):
+        try:
+            robot.description.table.changed(robot.values, numbers)
+        except WorkbenchError as error:
+            raise SpecError(f"{where}.{key}: {error}", file=str(file), key=key) from error
     if spec.limits and not torque_limits(campaign, robot):
         raise SpecError(
             f"{where}: limits = true, and neither robot file nor campaign says what an actuator gives; add"

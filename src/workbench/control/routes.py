@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from workbench.arrays import FloatArray
+from workbench.campaign.control_spec import PRINTED_COST
 from workbench.control.figures import Error, extrapolated
 from workbench.control.loop import TRACKED, Tracked
 from workbench.control.names import NOT_RUN
@@ -21,8 +22,8 @@ IMPLICIT_STEP = 2.5e-4
 """s: the second route's coarse step where no explicit method can move the robot, or the control period."""
 
 HALVED_TO = 2000.0
-"""Hz: up to this rate a run is made again at half the plant's step. Beyond, the step is shorter than 0.5 ms, where a
-half changes errors by less than a millionth (measured), and MuJoCo's route alone vouches for them."""
+"""Hz: up to this rate every run is made again at half the plant's step, as are those at the rate of a printed cost, by
+which sentences are judged. Of the others the step is shorter than 0.5 ms, and MuJoCo's route alone vouches for them."""
 
 AGREED = 0.01
 """Of the platform's error: where the routes differ by less, a tenth of what makes a figure undecided, the second is not
@@ -53,8 +54,24 @@ class Outcome:
     """m: what half the step changes in the platform's rms error by MuJoCo's route; NaN where it was not asked"""
 
 
+def step_of(period: float, step: float | None) -> float:
+    """S, the longest step of the package's route: as asked, or the period and at most `LONGEST_STEP`."""
+    return step or min(period, LONGEST_STEP)
+
+
+def is_halved(rate: float, rate_asked: str) -> bool:
+    """Tell whether a run at a rate, Hz, is made again at half the plant's step."""
+    return rate <= HALVED_TO * (1.0 + 1e-9) or rate_asked == PRINTED_COST
+
+
 def by_routes(
-    plant: Plant, stiff: StiffPlant | None, run: Run, error: ErrorOf, period: float, step: float | None
+    plant: Plant,
+    stiff: StiffPlant | None,
+    run: Run,
+    error: ErrorOf,
+    period: float,
+    step: float | None,
+    halve: bool = True,
 ) -> Outcome:
     """Run a loop by the package's route, at its step and at half of it, and by MuJoCo's where *stiff* is given.
 
@@ -68,12 +85,14 @@ def by_routes(
         s, of the control loop.
     step
         s, longest of the plant; None is the period, at most `LONGEST_STEP`.
+    halve
+        `is_halved`.
     """
-    own_step = step or min(period, LONGEST_STEP)
+    own_step = step_of(period, step)
     tracked = run(plant, own_step, 1)
     own = error(tracked.q, tracked.x) if tracked.status == TRACKED else None
     halved = None
-    if own and 1.0 / period <= HALVED_TO * (1.0 + 1e-9):
+    if own and halve:
         half = run(plant, 0.5 * own_step, 1)
         halved = error(half.q, half.x) if half.status == TRACKED else None
     if stiff is None:

@@ -9,7 +9,8 @@ from typing import Any
 
 from workbench.campaign import store
 from workbench.campaign.changes import Changes, Variant, changes_of
-from workbench.campaign.conclusion import FAILED, INCOMPLETE, PASSED, Conclusion
+from workbench.campaign.conclusion import FAILED, INCOMPLETE, NOTHING_JUDGED, PASSED, Conclusion
+from workbench.campaign.control_spec import ControlClaim
 from workbench.campaign.manifest import Begun, describe
 from workbench.campaign.replacing import request_of
 from workbench.campaign.spec import Campaign
@@ -17,9 +18,10 @@ from workbench.campaign.user_candidates import full_names, load_candidates
 from workbench.capabilities.robot import Robot
 from workbench.control import files as study_files
 from workbench.control.claims import HOLDS, NOT_ABOUT, Known, Verdict, judged
-from workbench.control.evaluate import StudyContext, study_key
-from workbench.control.figures import is_decided
+from workbench.control.evaluate import Study, StudyContext, study_key
+from workbench.control.figures import errors_in, is_decided, uncertainty_of
 from workbench.control.files import STUDY
+from workbench.control.footage import Footage, footage_of
 from workbench.control.names import CONTROL
 from workbench.control.plan import StudyPlan, plan_study, torque_limits
 from workbench.control.user_controller import load_controllers
@@ -34,6 +36,9 @@ from workbench.sweep.record import GOOD, Record, parse_line
 from workbench.sweep.resumable import Asked, SweepOptions, resumed
 
 NOTHING_CHANGED = Changes()
+
+Film = Callable[[Callable[[], Footage | None], Path], object]
+"""Draws into a run directory what its first argument makes."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,7 @@ def run_study(
     command: Sequence[str] = (),
     show: Show | None = None,
     report: Callable[[Path], object] | None = None,
+    film: Film | None = None,
     options: SweepOptions | None = None,
     candidates: Sequence[str | Path] = (),
     controllers: Sequence[str | Path] = (),
@@ -70,6 +76,8 @@ def run_study(
         Run directory; finished runs in it are taken over where all that determines them is the same.
     model, settings, command, show, report, options, candidates
         As for `run_sweep`.
+    film
+        Draws, before the report is written, from what makes the footage and the run directory; None is no film.
     controllers
         Python files with controllers of the user's own.
 
@@ -120,6 +128,8 @@ def run_study(
         files.write_json(directory / CONTROL, summary)
         files.write_json(directory / store.MANIFEST, manifest)
         held.complete((files.PROGRESS,))
+        if film:
+            film(lambda: footage_of(Study(plan, settings, own), records), directory)
         if report:
             report(directory)
     return StudyOutcome(directory, conclusion_of(summary), summary, manifest)
@@ -147,19 +157,23 @@ def known_runs(plan: StudyPlan, records: Sequence[Record]) -> list[Known]:
         if record.status not in GOOD:
             continue
         row = next((row for row in record.rows if row["joint"] == "platform"), {})
-        errors = {r: row[r] for r in ("rms", "rms_halved", "rms_second") if row.get(r) is not None}
-        found.append(Known(loop, errors))
+        found.append(Known(loop, errors_in(row)))
     return found
 
 
 def summarise(plan: StudyPlan, records: Sequence[Record], changes: Changes = NOTHING_CHANGED) -> dict[str, Any]:
     """What stands in ``control.json``: counts, how well errors are known, claims with their verdicts.
 
-    A claim about a case whose robot is another than the published one is not judged.
+    A claim about a case whose robot is another than the published one, in more than the claim says, is not judged.
     """
     runs = known_runs(plan, records)
-    others = {case.name: changes.why_not(case.name) for case in plan.campaign.case}
-    verdicts = judged(plan.spec, runs, {case: why for case, why in others.items() if why})
+
+    def not_about(claim: ControlClaim) -> str:
+        about = claim.cases or [case.name for case in plan.campaign.case]
+        why = [changes.why_not(case, known=claim.parameters) for case in about]
+        return "; ".join(dict.fromkeys(text for text in why if text))
+
+    verdicts = judged(plan.spec, runs, not_about)
     unstable = [record for record in records if record.status in GOOD and not record.rows]
     undecided = [run for run in runs if run.errors and not _is_known(run, plan.spec.second_route == "all")]
     failed = [record for record in records if record.status not in GOOD]
@@ -178,12 +192,6 @@ def summarise(plan: StudyPlan, records: Sequence[Record], changes: Changes = NOT
     }
 
 
-def uncertainty_of(errors: Mapping[str, float]) -> float:
-    """How well the platform's error of a run is known, m: the largest difference between routes and steps."""
-    others = [abs(errors[name] - errors["rms"]) for name in ("rms_halved", "rms_second") if name in errors]
-    return max(others, default=float("nan"))
-
-
 def _is_known(run: Known, both: bool) -> bool:
     if both and "rms_second" not in run.errors:
         return False
@@ -191,12 +199,15 @@ def _is_known(run: Known, both: bool) -> bool:
 
 
 def conclusion_of(summary: Mapping[str, Any]) -> Conclusion:
-    """The verdict on a study: whether every run could be computed; what it found stands beside it."""
+    """The verdict on a study: whether every run could be computed and any tracks; what it found stands beside it."""
     runs = f"{summary['tracked']} of {summary['runs']} runs tracked their motion, {summary['unstable']} unstable"
     known = f", {summary['undecided']} undecided" if summary["undecided"] else ""
     if summary["failed"]:
         status = FAILED if summary["failed"] == summary["runs"] else INCOMPLETE
         return Conclusion(status, f"{runs}{known}; {summary['failed']} could not be computed: {summary['reasons'][0]}")
+    if not summary["tracked"]:
+        first = summary["first_unstable"][0]["reason"]
+        return Conclusion(NOTHING_JUDGED, f"none of {summary['runs']} runs tracked its motion, the first is {first}")
     claims: Sequence[Mapping[str, Any]] = summary["claims"]
     here = [claim["verdict"] for claim in claims if claim["verdict"] != NOT_ABOUT]
     said = f"; {here.count(HOLDS)} of {len(here)} claims hold" if here else ""

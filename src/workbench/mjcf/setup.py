@@ -146,7 +146,7 @@ class Preparation:
 
 
 def _motor(spec: mujoco.MjSpec, joint: str) -> None:
-    """Add a motor of which nothing is left to the file's defaults."""
+    """Add a motor; nothing that acts on a joint is left to the defaults of the file."""
     limited = mujoco.mjtLimited.mjLIMITED_FALSE
     motor = spec.add_actuator()
     motor.set_to_motor()
@@ -158,7 +158,7 @@ def _motor(spec: mujoco.MjSpec, joint: str) -> None:
     for limits in ("ctrlrange", "forcerange", "actrange", "lengthrange", "velrange", "ffrange"):
         setattr(motor, limits, [0.0, 0.0])
     motor.armature, motor.damping, motor.delay, motor.nsample = 0.0, [0.0] * 3, 0.0, 0
-    motor.cranklength, motor.inheritrange, motor.actearly, motor.group = 0.0, 0.0, False, 0
+    motor.inheritrange, motor.actearly, motor.group = 0.0, False, 0
 
 
 def plan(model: mujoco.MjModel, file: str, setup: Setup) -> Preparation:

@@ -134,23 +134,24 @@ class OrderedClosure(Continuation):
                 self._reach(q, one, found, q[before], before, found)  # raises, and says where the way ends
         return found
 
-    def close_near(self, q: FloatArray, qpos: FloatArray) -> Assembly:
-        """Close actuated coordinates ``(n, na)``, each from a closed configuration ``(n, nq)`` of its own.
+    def close_near(self, q: FloatArray, qpos: FloatArray, count: int = 1) -> Assembly:
+        """Close actuated coordinates ``(n count, na)``, *count* from each of the closed configurations ``(n, nq)``.
 
         Raises
         ------
         MotionError
             Naming the first sample that cannot be reached.
         """
-        n, own = len(q), qpos[:, self.structure.actuated_qpos]
-        start, found = self._nothing(n, q.shape[1]), self._nothing(n, q.shape[1])
+        n, own = len(qpos), qpos[:, self.structure.actuated_qpos]
+        start, found = self._nothing(n, q.shape[1]), self._nothing(len(q), q.shape[1])
 
         def block(evaluator: Evaluator, rows: slice) -> None:
             names = np.arange(rows.start, rows.stop)
             start.put(names, self._newton(evaluator, qpos[rows].copy(), own[rows]))
 
         self.engine.in_blocks(block, n)
-        self._reach(q, np.arange(n), start, own, np.arange(n), found)
+        rows = np.repeat(np.arange(n), count)
+        self._reach(q, np.arange(len(q)), start, own[rows], rows, found)
         return found
 
     def _linked(self, found: Assembly, q: FloatArray) -> np.ndarray:

@@ -63,6 +63,8 @@ def body_motion(
     external_force: FloatArray | None = None,
     centres: bool = True,
     along: ArrayLike | None = None,
+    *,
+    known: ReferenceResult | None = None,
 ) -> BodyMotion:
     """Evaluate the motion of every body.
 
@@ -80,6 +82,8 @@ def body_motion(
         True: points are mass centres and axes principal ones; False: points are body frames' origins, axes theirs.
     along
         Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
+    known
+        What `MujocoReference.inverse_dynamics` gives for these arguments, where it is at hand.
 
     Raises
     ------
@@ -93,7 +97,7 @@ def body_motion(
             f"{reference.file}: {reference.excess_actuators} actuator(s) more than freedoms; the torque is one of many"
             " and has no parts by body"
         )
-    result = reference.inverse_dynamics(q, qd, qdd, mass_model, external_force, along=along)
+    result = known or reference.inverse_dynamics(q, qd, qdd, mass_model, external_force, along=along)
     tangent = reference.tangent(np.asarray(q, dtype=np.float64), near=result.qpos)
     model = reference.compiled(mass_model)
     data = mujoco.MjData(model)

@@ -75,7 +75,7 @@ def limits_left(model: mujoco.MjModel, qpos: FloatArray) -> list[LimitLeft]:
         name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, int(joint))
         found += _beyond("joint", name, unit, values, lower, upper)
     table = fixed_tendons(model)
-    scalars = qpos[:, np.asarray(model.jnt_qposadr)] if model.njnt else qpos[:, :0]
+    scalars = qpos[:, np.asarray(model.jnt_qposadr)]
     for tendon in np.flatnonzero(model.tendon_limited):
         if is_fixed(model, int(tendon)):
             lower, upper = (float(value) for value in model.tendon_range[tendon])

@@ -119,7 +119,7 @@ class MujocoReference(PlatformSide):
         """The same model driven by as many actuators as there are freedoms, and their places among all."""
         return self._leader or (self, slice(None))
 
-    def tangent(self, q: FloatArray, ordered: bool = False, near: ArrayLike | None = None) -> FloatArray:
+    def tangent(self, q: FloatArray, ordered: bool = False, near: ArrayLike | Assembly | None = None) -> FloatArray:
         """All velocities per actuated one, ``(n, nv, na)``; samples closed as `inverse_dynamics` does."""
         return self._assemble(q, ordered, near).tangent
 
@@ -210,7 +210,7 @@ class MujocoReference(PlatformSide):
         external_force: ArrayLike | None = None,
         *,
         along: ArrayLike | None = None,
-        near: ArrayLike | None = None,
+        near: ArrayLike | Assembly | None = None,
     ) -> ReferenceResult:
         """Actuator forces that produce a motion, with everything needed to judge them.
 
@@ -227,7 +227,8 @@ class MujocoReference(PlatformSide):
             refused. None: every sample is closed from home by straight lines, which is another assembly where the
             motion runs around a cusp of the singular curve.
         near
-            Closed configurations ``(n, nq)``, as `ReferenceResult.qpos`, from which the samples are closed instead.
+            Closed configurations ``(n, nq)``, as `ReferenceResult.qpos`, from which the samples are closed instead; or
+            the samples' own.
 
         Raises
         ------
@@ -340,7 +341,9 @@ class MujocoReference(PlatformSide):
             )
         return self._engines[mass_model]
 
-    def _assemble(self, q: FloatArray, ordered: bool = False, near: ArrayLike | None = None) -> Assembly:
+    def _assemble(self, q: FloatArray, ordered: bool = False, near: ArrayLike | Assembly | None = None) -> Assembly:
+        if isinstance(near, Assembly):
+            return near
         if near is not None:
             return self._closer.close_near(q, as_batch("near", near, len(self._closer.home)))
         if self._closed is None or self._closed[2] != ordered or not np.array_equal(self._closed[0], q):

@@ -15,9 +15,11 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batch, as_batches, as_force
 from workbench.errors import ArrayError, MotionError
+from workbench.reference.displaced import Displaced
 from workbench.reference.energy_jump import energy_jump, losses
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.reference.power_terms import Terms, terms_of
+from workbench.reference.result import ReferenceResult
 
 MOST_SAMPLES = 150
 """Samples looked at; a longer motion is thinned out evenly, and the samples of greatest power are always kept."""
@@ -101,6 +103,9 @@ def power_balance(
     external_force: ArrayLike | None = None,
     tau: ArrayLike | None = None,
     along: ArrayLike | None = None,
+    *,
+    known: ReferenceResult | None = None,
+    displaced: Displaced | None = None,
 ) -> PowerBalance:
     """Hold torques against the rate of MuJoCo's energy.
 
@@ -118,6 +123,10 @@ def power_balance(
         Torques to judge, ``(n, na)``; None judges the reference's own.
     along
         Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
+    known
+        What `MujocoReference.inverse_dynamics` gives for these arguments, where it is at hand.
+    displaced
+        `displaced_samples` of the same motion, where another mass model's balance is struck too.
 
     Raises
     ------
@@ -131,13 +140,14 @@ def power_balance(
     if not len(q):
         raise ArrayError("q: expected at least one sample, got none")
     force = as_force("external_force", external_force, len(q))
-    result = reference.inverse_dynamics(q, qd, qdd, mass_model, force, along=along)
+    result = known or reference.inverse_dynamics(q, qd, qdd, mass_model, force, along=along)
     torques = result.tau if tau is None else _same_shape(tau, q)
     power = np.sum(torques * qd, axis=1)
     peak = float(np.abs(power).max())
     kept = _selection(power)
     jump = 0.0 if along is None else energy_jump(reference, result, power, force, mass_model, np.asarray(along))
-    storage, doubt, steps = _energy_rate(reference, result.qpos[kept], q[kept], qd[kept], qdd[kept], mass_model)
+    displaced = displaced or displaced_samples(reference, result.qpos, q, qd, qdd)
+    storage, doubt, steps = _energy_rate(displaced, kept, mass_model)
     qvel = result.qvel[kept]
     terms = terms_of(reference.compiled(mass_model), result.qpos[kept], qvel, result.qacc[kept])
     dissipation = losses(reference, mass_model, result.qpos[kept], qvel)
@@ -197,29 +207,35 @@ def time_scale(qd: FloatArray, qdd: FloatArray) -> float:
     return float(min(changes.min(initial=np.inf), FARTHEST / speed.max()))
 
 
-def _energy_rate(
-    reference: MujocoReference, qpos: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray, mass_model: str
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def displaced_samples(
+    reference: MujocoReference, qpos: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray
+) -> Displaced:
+    """What a difference quotient looks at: the samples of a motion, closed at *qpos* ``(n, nq)``, moved both ways."""
+    times = np.array([sign * k for k in range(1, len(WEIGHTS) + 1) for sign in (1.0, -1.0)])
+    return Displaced(reference, qpos, q, qd, qdd, times)
+
+
+def _energy_rate(displaced: Displaced, kept: np.ndarray, mass_model: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return dE/dt ``(m,)``, how far it is in doubt, both in watts, and the step that it was found with, s."""
-    scale = time_scale(qd, qdd)
+    scale, count = time_scale(displaced.qd[kept], displaced.qdd[kept]), len(kept)
     if not np.isfinite(scale):
-        return np.zeros(len(q)), np.zeros(len(q)), np.full(len(q), np.inf)
+        return np.zeros(count), np.zeros(count), np.full(count, np.inf)
     step = FIRST_STEP * scale
     for attempt in range(SHRINKINGS + 1):
         try:
-            rate = _difference(reference, qpos, q, qd, qdd, mass_model, step)
+            rate = _difference(displaced, kept, mass_model, step)
             break
         except MotionError:
             # a displaced sample beyond the edge of the workspace; the samples themselves were closed before
             if attempt == SHRINKINGS:
                 raise
             step *= 0.5
-    best, doubt = rate.copy(), np.full(len(q), np.inf)
-    estimate, steps = rate.copy(), np.full(len(q), step)
-    active = np.arange(len(q))
+    best, doubt = rate.copy(), np.full(count, np.inf)
+    estimate, steps = rate.copy(), np.full(count, step)
+    active = np.arange(count)
     for _ in range(HALVINGS):
         step *= 0.5
-        finer = _difference(reference, qpos[active], q[active], qd[active], qdd[active], mass_model, step)
+        finer = _difference(displaced, kept[active], mass_model, step)
         # Richardson: the error of the twelfth-order difference falls by 2^12 with each halving
         refined = finer + (finer - rate[active]) / 4095.0
         gap = np.abs(refined - estimate[active])
@@ -233,27 +249,13 @@ def _energy_rate(
     return best, doubt, steps
 
 
-def _difference(
-    reference: MujocoReference,
-    qpos: FloatArray,
-    q: FloatArray,
-    qd: FloatArray,
-    qdd: FloatArray,
-    mass_model: str,
-    step: float,
-) -> FloatArray:
+def _difference(displaced: Displaced, samples: np.ndarray, mass_model: str, step: float) -> FloatArray:
     """Twelfth-order central difference of the energy along q + qd t + qdd t^2/2."""
-    n = len(q)
-    times = step * np.array([sign * k for k in range(1, len(WEIGHTS) + 1) for sign in (1, -1)])[:, None, None]
-    moved = (q + qd * times + 0.5 * qdd * times**2).swapaxes(0, 1).reshape(-1, q.shape[1])
-    speed = (qd + qdd * times).swapaxes(0, 1).reshape(-1, q.shape[1])
-    still = np.zeros_like(moved)
-    # along the curve excess actuators would leave the mechanism's motions; the leading ones determine its state
-    solver, lead = reference.determining
-    moved, speed, still = moved[:, lead], speed[:, lead], still[:, lead]
-    # each from its own sample's configuration: from home another assembly may be on the way
-    found = solver.inverse_dynamics(moved, speed, still, mass_model, near=np.repeat(qpos, len(times), axis=0))
-    energy = found.energy.sum(axis=1).reshape(n, len(WEIGHTS), 2)
+    solver, _ = displaced.reference.determining
+    closed = displaced.closed(samples, step)
+    moved, speed = displaced.moved(samples, step)
+    found = solver.inverse_dynamics(moved, speed, np.zeros_like(moved), mass_model, near=closed)
+    energy = found.energy.sum(axis=1).reshape(len(samples), len(WEIGHTS), 2)
     rate: FloatArray = (energy[:, :, 0] - energy[:, :, 1]) @ np.array(WEIGHTS) / step
     return rate
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray, as_batches, as_force
 from workbench.reference.mujoco_reference import MujocoReference
+from workbench.reference.result import ReferenceResult
 
 
 def raw_mj_inverse(
@@ -24,6 +25,8 @@ def raw_mj_inverse(
     mass_model: str = "distributed",
     external_force: ArrayLike | None = None,
     along: ArrayLike | None = None,
+    *,
+    known: ReferenceResult | None = None,
 ) -> FloatArray:
     """`qfrc_inverse` at the actuated joints, on the exactly closed motion, without projection.
 
@@ -39,6 +42,8 @@ def raw_mj_inverse(
         Newtons, paper frame, on the platform: ``(3,)`` or ``(n, 3)``. What it does at the actuated joints is taken off.
     along
         Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
+    known
+        What `MujocoReference.inverse_dynamics` gives for this motion, where it is at hand.
 
     Returns
     -------
@@ -53,7 +58,7 @@ def raw_mj_inverse(
     structure = reference.structure
     q, qd, qdd = as_batches(len(structure.actuated), q=q, qd=qd, qdd=qdd)
     force = as_force("external_force", external_force, len(q)) @ reference.base_rotation.T
-    motion = reference.inverse_dynamics(q, qd, qdd, mass_model, along=along)
+    motion = known or reference.inverse_dynamics(q, qd, qdd, mass_model, along=along)
     model = reference.compiled(mass_model)
     data = mujoco.MjData(model)
     point = np.zeros((3, model.nv))

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import qr
 
 from workbench.arrays import FloatArray
 from workbench.dry_friction import direction
@@ -20,6 +19,7 @@ from workbench.errors import MotionError
 from workbench.reference.structure import Structure
 
 if TYPE_CHECKING:
+    from workbench.reference.continuation import Assembly
     from workbench.reference.mujoco_reference import MujocoReference
     from workbench.reference.result import ReferenceResult
 
@@ -70,6 +70,8 @@ def leading(structure: Structure, jacobian: FloatArray, rank: int) -> tuple[np.n
         Their places among the actuated joints, and the tables in which the other actuated joints are passive.
     """
     motions = np.linalg.svd(jacobian, full_matrices=True)[2][rank:]
+    from scipy.linalg import qr  # few robots have actuators in excess
+
     order = qr(motions[:, structure.actuated], pivoting=True, mode="r")[1]
     chosen = np.sort(order[: len(motions)])
     actuated = structure.actuated[chosen]
@@ -120,7 +122,7 @@ def shared(
     mass_model: str,
     external_force: ArrayLike | None,
     along: ArrayLike | None = None,
-    near: ArrayLike | None = None,
+    near: ArrayLike | Assembly | None = None,
 ) -> ReferenceResult:
     """Inverse dynamics of excess actuators: the leading ones give motion and power, all of them share the load.
 

@@ -16,7 +16,7 @@ from scipy.linalg import eigh
 from workbench.arrays import FloatArray
 from workbench.reference.forward_kernels import DONE, LOST
 from workbench.reference.mujoco_reference import MujocoReference
-from workbench.reference.replay import LOOP_SOLIMP, near_rigid
+from workbench.reference.replay import IMPEDANCE, near_rigid
 
 EXPLICIT = 1.0
 """Rate of the fastest damper or spring times the step: an explicit method of order four is stable up to 2.78."""
@@ -102,7 +102,7 @@ class StiffPlant:
         model, kinds = self._model, mujoco.mjtIntegrator
         model.opt.integrator = kinds.mjINT_RK4 if explicit else kinds.mjINT_IMPLICITFAST
         model.eq_solref[:] = [2.0 * step, 1.0]
-        model.eq_solimp[:] = LOOP_SOLIMP
+        model.eq_solimp[:, :2] = IMPEDANCE
         if model.nv:
             model.dof_solref[:] = [2.0 * step, 1.0]
 

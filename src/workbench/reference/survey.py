@@ -354,12 +354,12 @@ def places(model: mujoco.MjModel, seen: Survey) -> Places:
     moves = [bool(model.body_dofnum[model.body_rootid[b]] or _above(model, b)) for b in range(model.nbody)]
     bodies = [b for b in range(1, model.nbody) if moves[b] and mujoco.mj_id2name(model, obj.mjOBJ_BODY, b)]
     loops = _loop_bodies(model)
-    site, score = "", 0
+    site, score = "", -1
     for index in range(model.nsite):
         name = mujoco.mj_id2name(model, obj.mjOBJ_SITE, index)
         body = int(model.site_bodyid[index])
         if name and moves[body]:
-            found = 1 + (body in loops) + 4 * any(word in name.lower() for word in NAMES)
+            found = (body in loops) + 4 * any(word in name.lower() for word in NAMES)
             if found > score:
                 site, score = name, found
     held = held_roots(model)

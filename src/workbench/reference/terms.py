@@ -17,6 +17,7 @@ from workbench.errors import ParameterError
 from workbench.reference.body_forces import felt_gravity
 from workbench.reference.body_motion import BodyMotion, body_motion
 from workbench.reference.mujoco_reference import MujocoReference
+from workbench.reference.result import ReferenceResult
 
 WEIGHT, ACCELERATION, VELOCITY = "weight", "acceleration", "velocity"
 SPRINGS, FRICTION, FORCE = "springs", "friction", "external force"
@@ -79,6 +80,8 @@ def torque_terms(
     mass_model: str = "distributed",
     external_force: ArrayLike | None = None,
     along: ArrayLike | None = None,
+    *,
+    known: ReferenceResult | None = None,
 ) -> Terms:
     """Take the torque of each sample apart.
 
@@ -94,6 +97,8 @@ def torque_terms(
         Newtons, base (paper) frame, on the platform: ``(3,)`` or ``(n, 3)``.
     along
         Times ``(n,)`` of samples that are one motion, as for `MujocoReference.inverse_dynamics`.
+    known
+        What `MujocoReference.inverse_dynamics` gives for these arguments, where it is at hand.
 
     Raises
     ------
@@ -104,7 +109,7 @@ def torque_terms(
     """
     q, qd, qdd = as_batches(len(reference.joint_names), q=q, qd=qd, qdd=qdd)
     force = as_force("external_force", external_force, len(q))
-    moving = body_motion(reference, q, qd, qdd, mass_model, force, along=along)
+    moving = body_motion(reference, q, qd, qdd, mass_model, force, along=along, known=known)
     found = [*_of_bodies(reference, moving, mass_model), *_of_joints(reference, moving, qd, qdd, mass_model)]
     found += _of_force(reference, moving, force)
     kept = tuple(item for item in found if item.tau.any())

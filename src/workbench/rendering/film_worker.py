@@ -1,6 +1,6 @@
-"""Draws a run's pictures in a process of its own: a still and a sheet of small frames, both WebP.
+"""Draws pictures of a robot's course in a process of its own: stills and sheets of small frames, all WebP.
 
-A wrong OpenGL ends the process that tries it, so this is never the run's own (`workbench.rendering.run_pictures`).
+A wrong OpenGL ends the process that tries it, so this is never the run's own (`workbench.rendering.drawing`).
 """
 
 from __future__ import annotations
@@ -17,26 +17,36 @@ from PIL import Image
 from workbench.rendering.dressing import dress
 from workbench.rendering.worker import MODEL, POSES, rendered
 
-STILL, FILM = "mechanism.webp", "film.webp"
-STILL_QUALITY, FILM_QUALITY = 88, 70
+GHOSTS = "ghosts.npy"
+STILL, SHEET = "still-{}.webp", "sheet-{}.webp"
+STILL_QUALITY, SHEET_QUALITY = 88, 70
 FINER = 2
 """Pictures are drawn so many times as large as they are kept, which smooths their edges for less than samples do."""
 SHADOWS = 1024
 """Pixels of the map of shadows; MuJoCo's own 4096 takes half of the time without a graphics card."""
 
 
-def film(folder: Path, width: int, height: int, columns: int) -> None:
-    """Draw the poses in *folder*: the first one twice as large, all of them as one sheet of frames, row by row."""
+def film(folder: Path, width: int, height: int, columns: int, still: int) -> None:
+    """Draw the films ``(films, n, nq)`` in *folder*, all seen from one place.
+
+    Each becomes a sheet of its frames, row by row, and a picture twice as large of the frame *still*. Where there are
+    ghosts, ``(n, nq)``, they shine through every film.
+    """
     model = mujoco.MjModel.from_binary_path(str(folder / MODEL))
     model.vis.quality.offsamples, model.vis.quality.shadowsize = 0, SHADOWS
-    poses = np.load(folder / POSES)
-    dress(model, poses, width / height)
-    large = next(rendered(model, poses[:1], 2 * FINER * width, 2 * FINER * height))
-    _smaller(large).save(folder / STILL, format="WEBP", quality=STILL_QUALITY, method=4)
-    sheet = Image.new("RGB", (columns * width, -(-len(poses) // columns) * height))
-    for number, picture in enumerate(rendered(model, poses, FINER * width, FINER * height)):
-        sheet.paste(_smaller(picture), (number % columns * width, number // columns * height))
-    sheet.save(folder / FILM, format="WEBP", quality=FILM_QUALITY, method=2)
+    films = np.load(folder / POSES)
+    ghosts = np.load(folder / GHOSTS) if (folder / GHOSTS).is_file() else None
+    seen = films.reshape(-1, films.shape[-1])
+    dress(model, seen if ghosts is None else np.concatenate([seen, ghosts]), width / height)
+    for number, poses in enumerate(films):
+        beside = None if ghosts is None else ghosts[still : still + 1]
+        shot = poses[still : still + 1]
+        large = next(rendered(model, shot, 2 * FINER * width, 2 * FINER * height, ghosts=beside))
+        _smaller(large).save(folder / STILL.format(number), format="WEBP", quality=STILL_QUALITY, method=4)
+        sheet = Image.new("RGB", (columns * width, -(-len(poses) // columns) * height))
+        for k, picture in enumerate(rendered(model, poses, FINER * width, FINER * height, ghosts=ghosts)):
+            sheet.paste(_smaller(picture), (k % columns * width, k // columns * height))
+        sheet.save(folder / SHEET.format(number), format="WEBP", quality=SHEET_QUALITY, method=2)
 
 
 def _smaller(picture: np.ndarray) -> Image.Image:
@@ -54,4 +64,4 @@ if __name__ == "__main__":
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if hasattr(os, "nice"):
         os.nice(10)  # the run that it belongs to goes first
-    film(Path(sys.argv[1]), *map(int, sys.argv[2:5]))
+    film(Path(sys.argv[1]), *map(int, sys.argv[2:6]))

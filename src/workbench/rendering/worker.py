@@ -24,27 +24,48 @@ SKY = np.array([[245, 247, 252], [199, 212, 230]])
 FAR = 0.999
 """Share of the farthest depth from which on nothing was drawn."""
 MODEL, POSES = "model.mjb", "qpos.npy"
+GHOST = 0.28
+"""Opacity of a robot that is shown where it should be, beside where it is."""
 
 
 def rendered(
-    model: mujoco.MjModel, poses: FloatArray, width: int, height: int, camera: str = ""
+    model: mujoco.MjModel,
+    poses: FloatArray,
+    width: int,
+    height: int,
+    camera: str = "",
+    ghosts: FloatArray | None = None,
 ) -> Iterator[NDArray[np.uint8]]:
-    """Draw each row of *poses* ``(n, nq)``: pictures ``(height, width, 3)``."""
+    """Draw each row of *poses* ``(n, nq)``, with that of *ghosts* shining through: pictures ``(height, width, 3)``."""
     model.vis.global_.offwidth, model.vis.global_.offheight = width, height
     light_up(model)
     bare = not np.any(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     data = mujoco.MjData(model)
     with mujoco.Renderer(model, height, width) as renderer:
-        for qpos in poses:
+        for number, qpos in enumerate(poses):
             data.qpos = qpos
             mujoco.mj_forward(model, data)
             renderer.update_scene(data, camera or -1)
+            if ghosts is not None:
+                _add_ghost(model, ghosts[number], renderer.scene)
             picture = np.ascontiguousarray(renderer.render())
             if bare:
                 renderer.enable_depth_rendering()
                 put_behind(picture, renderer.render() >= FAR * model.vis.map.zfar * model.stat.extent)
                 renderer.disable_depth_rendering()
             yield picture
+
+
+def _add_ghost(model: mujoco.MjModel, qpos: FloatArray, scene: mujoco.MjvScene) -> None:
+    """Add the moving bodies at another pose to a scene, so that one can look through them."""
+    data = mujoco.MjData(model)
+    data.qpos = qpos
+    mujoco.mj_forward(model, data)
+    first, moving = scene.ngeom, mujoco.mjtCatBit.mjCAT_DYNAMIC
+    mujoco.mjv_addGeoms(model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), moving, scene)
+    for geom in scene.geoms[first : scene.ngeom]:
+        geom.rgba[3] *= GHOST
+        geom.transparent = 1
 
 
 def light_up(model: mujoco.MjModel) -> None:

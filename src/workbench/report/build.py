@@ -10,32 +10,36 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from workbench.campaign.changed import ANOTHER, NOT_JUDGED
+from workbench.drawing_process import Drawn
 from workbench.errors import OutputError
 from workbench.report import kept_drawings
 from workbench.report.bibliography import NAME, bibliography, cited_keys
-from workbench.report.control.load import StudyRun, load_study
-from workbench.report.control.sections import study_sections
 from workbench.report.cost import cost_table
-from workbench.report.drawing import Show, draw
+from workbench.report.drawing import Beside, Show, draw
+from workbench.report.drawn_from import drawn_from
 from workbench.report.latex import latex_table
 from workbench.report.load import Run, load_run, read_manifest
 from workbench.report.paper_table import paper_table
 from workbench.report.section import Section
-from workbench.report.sections import build_sections
+from workbench.report.sections import build_sections, unique_keys
 from workbench.report.style import PAPERS, STYLES, figure_style
 from workbench.report.svg import StyleSheet, inline, standalone
-from workbench.report.sweep.load import SweepRun, load_sweep
-from workbench.report.sweep.sections import sweep_sections
 from workbench.report.text import fenced, finalize_markdown
 from workbench.report.verdict_section import changes, circumstances
 
+if TYPE_CHECKING:
+    from workbench.report.control.load import StudyRun
+    from workbench.report.sweep.load import SweepRun
+
 FIGURES = "figures"
+DRAWN_STYLE = "page"
+"""In which figures are drawn beside a run."""
 TABLES = "tables"
 _OWN_FIGURE = re.compile(r"(?:case|figure)-[a-z0-9-]+\.(?:svg|pdf)")
 _OWN_TABLE = re.compile(r"[a-z0-9-]+\.tex")
@@ -51,6 +55,7 @@ def build_report(
     paper: str = "a4",
     *,
     second: bool = False,
+    drawn: Drawn | None = None,
 ) -> list[Path]:
     """Write the report of a finished run beside its results.
 
@@ -70,6 +75,8 @@ def build_report(
         ``a4`` or ``letter``: the pages of report.pdf.
     second
         Whether a copy of this process may help to draw; not for programs with threads of their own.
+    drawn
+        Drawings that a process makes of the same run meanwhile; they are taken where they show what is stored.
 
     Returns
     -------
@@ -88,20 +95,27 @@ def build_report(
     run_dir = Path(run_dir)
     manifest = read_manifest(run_dir)
     run: Run | SweepRun | StudyRun
+    # what a run of cases does not need is not loaded
     if manifest.control is not None:
+        from workbench.report.control.load import load_study
+        from workbench.report.control.sections import study_sections
+
         run = load_study(run_dir, manifest)
         sections = study_sections(run)
     elif manifest.sweep is None:
         run = load_run(run_dir)
         sections = build_sections(run)
     else:
+        from workbench.report.sweep.load import load_sweep
+        from workbench.report.sweep.sections import sweep_sections
+
         run = load_sweep(run_dir, manifest)
         sections = sweep_sections(run)
     with figure_style(style), _few_collections():
-        files = _rendered(run, sections, formats, style, paper, show, second)
+        files = _rendered(run, sections, formats, style, paper, show, second, drawn)
     wanted = tuple(name for name in formats if name in DATA_FORMATS)
     if wanted and not isinstance(run, Run):
-        kind = "a sweep's" if isinstance(run, SweepRun) else "a study's"
+        kind = "a sweep's" if manifest.sweep is not None else "a study's"
         raise OutputError(f"{run_dir}: formats {', '.join(wanted)} go with a run of cases; {kind} data are Parquet")
     if wanted:
         from workbench.report.data_out import data_files  # pandas takes longer to load than a page to write
@@ -139,6 +153,7 @@ def _rendered(
     paper: str,
     show: Show | None,
     second: bool,
+    drawn: Drawn | None,
 ) -> dict[Path, bytes]:
     files: dict[Path, bytes] = {}
     if "pdf" in formats:
@@ -150,7 +165,10 @@ def _rendered(
     kept = not {"html", "md"} & {*formats} and isinstance(run, Run)
     kept = kept and kept_drawings.take(figures, run.directory, style, plots)
     if {"html", "md", "pdf"} & {*formats} and not kept:
-        draw(plots, steps.to, second=second)
+        beside = None
+        if drawn is not None and style == DRAWN_STYLE and isinstance(run, Run):
+            beside = Beside(drawn, drawn_from(run, plots, unique_keys("case", run.manifest.cases)))
+        draw(plots, steps.to, second=second, beside=beside)
     for number, plot in enumerate(plots, 1):
         if "md" in formats:
             files[figures / f"{plot.key}.svg"] = standalone(plot.svg, plot.alt).encode()

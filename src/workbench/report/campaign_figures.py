@@ -63,7 +63,12 @@ def campaign_plot(run: Run, record: FigureRecord, key: str, series: Series, anch
 
     axes_names = ", ".join(run.manifest.platform_axes)
     alt = f"{record.title}: platform {label} along {axes_names} over time, case {record.case}."
-    return Plot(key, WIDE, draw, alt, record.title, anchor)
+    return Plot(key, WIDE, draw, alt, record.title, anchor, declared=_declared(record))
+
+
+def _declared(record: FigureRecord) -> str:
+    # whether its source shows this robot is said beside a figure, not in it
+    return record.model_dump_json(exclude={"not_about"})
 
 
 def error_over_plot(run: Run, record: FigureRecord, key: str) -> Plot | str:
@@ -176,7 +181,7 @@ def _campaign_torque(run: Run, record: FigureRecord, key: str, series: Series, a
     comparison = f"; below, the error of {' and of '.join(said)} over the latter's peak" if said else ""
     shown = f"{torque_name(joint)} in {unit} over time of {', '.join(c.label for c in curves)}"
     alt = f"{record.title}: {shown}{comparison}."
-    return Plot(key, WIDE, draw, alt, record.title, anchor)
+    return Plot(key, WIDE, draw, alt, record.title, anchor, declared=_declared(record))
 
 
 def error_pairs(run: Run, curves: Sequence[Curve]) -> list[tuple[Curve, Curve]]:

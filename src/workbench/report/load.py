@@ -152,7 +152,8 @@ def load_run(directory: Path) -> Run:
             f"{directory}: holds a sweep of {manifest.sweep.cases} cases, where this needs a run without one; "
             "its data sets cases/ and summary/ read with pandas.read_parquet"
         )
-    rows = _read_summary(directory / "summary.csv")
+    path = directory / "summary.csv"
+    rows = rows_of(path, read_text(path))
     for number, row in enumerate(rows, start=2):
         for what, value, valid in (
             ("case", row.case, manifest.cases),
@@ -161,8 +162,7 @@ def load_run(directory: Path) -> Run:
         ):
             if value not in valid:
                 raise OutputError(
-                    f"{directory / 'summary.csv'}: line {number}: {what} {value!r} is not in manifest.json; "
-                    f"valid: {', '.join(valid)}"
+                    f"{path}: line {number}: {what} {value!r} is not in manifest.json; valid: {', '.join(valid)}"
                 )
     return Run(directory, manifest, rows)
 
@@ -205,9 +205,16 @@ def _recorded(manifest: Manifest, row: ErrorRow) -> tuple[str, ...]:
     return tuple(case.recorded) if case and row.kind == "recorded" else ()
 
 
-def _read_summary(path: Path) -> tuple[ErrorRow, ...]:
+def rows_of(path: Path, text: str) -> tuple[ErrorRow, ...]:
+    """Return what the *text* of a summary.csv holds; *path* is where it stands, for messages.
+
+    Raises
+    ------
+    OutputError
+        As `load_run`.
+    """
     # The csv module and not pandas: a case may be called "nan" or "1e5" and must stay text.
-    reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
+    reader = csv.DictReader(io.StringIO(text, newline=""))
     rows: dict[tuple[str, ...], ErrorRow] = {}
     try:
         header = reader.fieldnames or []

@@ -22,6 +22,7 @@ from workbench.campaign.changed import ANOTHER, NOT_JUDGED
 from workbench.errors import OutputError
 from workbench.records import reason
 from workbench.report.case_section import CaseView
+from workbench.report.control.film import Shot
 from workbench.report.control.load import StudyRun
 from workbench.report.cost import cost_table
 from workbench.report.load import Run
@@ -157,6 +158,7 @@ def _blocks(section: Section, style: str, parts: dict[str, str]) -> Iterator[Blo
         yield {"kind": "code", "text": found.command}
     for text in context.get("paragraphs", ()):
         yield _text(text)
+    yield from _stills(context.get("shots", ()), parts)
     if context.get("command"):
         yield {"kind": "code", "text": context["command"]}
     if context.get("note"):
@@ -170,6 +172,17 @@ def _blocks(section: Section, style: str, parts: dict[str, str]) -> Iterator[Blo
         yield {"kind": "points", "points": list(context["points"])}
     for view in cases:
         yield from _case(view, style, parts)
+
+
+def _stills(shots: Sequence[Shot], parts: dict[str, str]) -> Iterator[Block]:
+    """The pictures of a study's film, two in a row."""
+    shown = []
+    for number, shot in enumerate(shots):
+        name = f"tracking-{number}.svg"
+        parts[name] = _picture(shot.still, shot.still_file)
+        shown.append(_figure(name, f"{shot.name}: {shot.caption}", shot.alt))
+    for first in range(0, len(shown), 2):
+        yield {"kind": "plots", "plots": shown[first : first + 2], "wide": False}
 
 
 def _opening(context: Mapping[str, Any], style: str, parts: dict[str, str]) -> Iterator[Block]:

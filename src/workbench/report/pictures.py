@@ -55,12 +55,12 @@ class Film:
     @property
     def address(self) -> str:
         """The sheet of frames as an address that loads nothing."""
-        return f"data:image/webp;base64,{base64.b64encode(self.sheet).decode('ascii')}"
+        return address(self.sheet)
 
     @property
     def still_address(self) -> str:
         """The still picture as an address that loads nothing."""
-        return f"data:image/webp;base64,{base64.b64encode(self.still).decode('ascii')}"
+        return address(self.still)
 
     @property
     def times(self) -> str:
@@ -106,10 +106,22 @@ def film_of(run: Run) -> Film | None:
     ):
         raise OutputError(f"{path}: case {record.case!r} with {len(record.times)} frames; needed: a case of the run")
     folder = run.directory / FOLDER
-    return Film(record.case, "", record, _webp(folder / FILM), _webp(folder / STILL))
+    return Film(record.case, "", record, webp(folder / FILM), webp(folder / STILL))
 
 
-def _webp(path: Path) -> bytes:
+def address(picture: bytes) -> str:
+    """Return a WebP picture as an address that loads nothing."""
+    return f"data:image/webp;base64,{base64.b64encode(picture).decode('ascii')}"
+
+
+def webp(path: Path) -> bytes:
+    """Read a stored picture.
+
+    Raises
+    ------
+    OutputError
+        It is missing, no WebP, or too large for a page.
+    """
     try:
         content = read_bytes(path, LARGEST)
     except OSError as error:

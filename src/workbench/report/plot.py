@@ -25,6 +25,8 @@ class Plot:
     """anchor of the case whose time slider moves a marker through it"""
     frames: str = ""
     """JSON of the positions that the page's script animates"""
+    declared: str = ""
+    """of a figure that the campaign asks for: its record, JSON"""
 
     @cached_property
     def svg(self) -> str:

@@ -22,6 +22,7 @@ SHORT = {
     "What drives the error": "Drivers",
     "Error over two numbers": "Maps",
     "The worst designs": "Worst designs",
+    "The robot in motion, its error enlarged": "Film",
     "What did not pass, and what was left out": "Not passed",
 }
 """Titles of sections in the list of contents, which stays in sight and has one line."""

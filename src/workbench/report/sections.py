@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,7 +46,7 @@ def build_sections(run: Run) -> list[Section]:
     """
     anchors = unique_keys("case", run.manifest.cases)
     figures = run.manifest.figures
-    keys = list(unique_keys("figure", [f"{i}\n{figure.id}" for i, figure in enumerate(figures)]).values())
+    keys = _figure_keys(figures)
     drawn: dict[int, Plot | str] = {}
     views = []
     film = film_of(run)
@@ -80,6 +80,29 @@ def build_sections(run: Run) -> list[Section]:
         limits_section(run),
     ]
     return [section for section in sections if section is not None]
+
+
+def plots_of_case(run: Run, case: str, names: Sequence[str]) -> list[Plot]:
+    """Return the figures of one case as `build_sections` has them in a run whose cases have all these *names*.
+
+    Raises
+    ------
+    OutputError
+        The series is missing or unreadable.
+    """
+    series = run.series(case)
+    anchor = unique_keys("case", names)[case]
+    found: list[Plot | str] = [*case_view(run, case, anchor, series).plots]
+    figures = [figure for figure in run.manifest.figures if figure.case == case and figure.kind != "error_over"]
+    found += [
+        campaign_plot(run, figure, key, series, anchor)
+        for figure, key in zip(figures, _figure_keys(figures), strict=True)
+    ]
+    return [plot for plot in found if isinstance(plot, Plot)]
+
+
+def _figure_keys(figures: Sequence[FigureRecord]) -> list[str]:
+    return list(unique_keys("figure", [f"{i}\n{figure.id}" for i, figure in enumerate(figures)]).values())
 
 
 def unique_keys(prefix: str, names: Any) -> dict[str, str]:

@@ -17,7 +17,7 @@ from workbench.report.manifest import Manifest
 LARGEST = 1_000_000_000
 MOST_ROWS = 400
 """Rows of a table of all runs; the rest stands in errors.parquet."""
-TEXTS = frozenset({"case", "controller", "model", "rate_asked", "status", "reason", "joint"})
+TEXTS = frozenset({"case", "controller", "model", "rate_asked", "status", "reason", "key", "joint"})
 
 
 class ClaimVerdict(Record):
@@ -94,7 +94,7 @@ def load_study(directory: Path, manifest: Manifest) -> StudyRun:
         One line that names the file and what is wrong with it.
     """
     study = read_record(directory / CONTROL, StudyRecord, 1)
-    runs = _rows(directory / RUNS, ("index", *LOOP_COLUMNS, "status", "reason", "ended", "spread"))
+    runs = _rows(directory / RUNS, ("index", *LOOP_COLUMNS, "status", "reason", "key", "ended", "spread"))
     errors: dict[int, dict[str, dict[str, Any]]] = {}
     for row in _rows(directory / ERRORS, ("index", *LOOP_COLUMNS, *ERROR_COLUMNS)):
         errors.setdefault(row["index"], {})[row["joint"]] = row

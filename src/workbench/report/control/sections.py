@@ -7,6 +7,7 @@ from typing import Any
 
 from workbench.control.names import NOT_RUN
 from workbench.report.control.curves import RATE, SPEED, curve, is_number
+from workbench.report.control.film import film_section
 from workbench.report.control.gap import gap_section
 from workbench.report.control.load import MOST_ROWS, StudyRun
 from workbench.report.plot import Plot
@@ -27,6 +28,7 @@ def study_sections(run: StudyRun) -> list[Section]:
         _over_section(run, RATE, "Tracking error over the control rate"),
         _over_section(run, SPEED, "Tracking error over the speed"),
         gap_section(run),
+        film_section(run),
         _unstable_section(run),
         _errors_section(run),
         _setting_section(run),
@@ -47,10 +49,12 @@ def _varied(verdict: str) -> Cell:
 
 def _answer_section(run: StudyRun) -> Section:
     study = run.study
-    counts = (
-        f"{study.tracked} of {study.runs} runs tracked their motion, {study.unstable} ended unstable, {study.undecided}"
-        f" are not known to a tenth of their error, {study.failed} could not be computed."
+    known = (
+        f"{study.undecided} errors are not known to a tenth of themselves"
+        if study.undecided
+        else "Every error is known to a tenth of itself"
     )
+    counts = f"{run.manifest.verdict}. {known}."
     tables = []
     if study.claims:
         rows = []
@@ -76,7 +80,7 @@ def _answer_section(run: StudyRun) -> Section:
             )
         )
         tables += _varied_table(run)
-    return plain_section("answer", "Is the model enough for control", [run.manifest.verdict, counts], tables)
+    return plain_section("answer", "Is the model enough for control", [counts], tables)
 
 
 def _varied_table(run: StudyRun) -> list[Table]:
@@ -253,13 +257,16 @@ def _step_left_open(run: StudyRun) -> list[str]:
     missing = sum(not is_number(error["rms_halved"]) for _, error in tracked)
     if not missing:
         return []
-    said = f"{missing} of {len(tracked)} runs were not made again at half the plant's step; above 2 kHz none are"
+    said = (
+        f"{missing} of {len(tracked)} runs were not made again at half the plant's step; above 2 kHz only those at the"
+        " rate of a printed cost are"
+    )
     if not halved:
-        return [f"{said}. What the step costs there is known by MuJoCo's route alone."]
+        return [f"{said}. What the step costs in the others is known by MuJoCo's route alone."]
     rate = max(rate for rate, _ in halved)
     most = max(abs(e["rms_halved"] / e["rms"] - 1.0) for at, e in halved if at == rate and e["rms"] > 0.0)
     return [
-        f"{said}. Steps are shorter there, and at {rate:g} Hz half of it changed no error by more than"
-        f" {100 * most:.2g} %. What it changes above is known by MuJoCo's route alone, which takes steps of the same"
-        " length in other coordinates; were both to err alike, nothing here would show it."
+        f"{said}. At {rate:g} Hz half of it changed no error by more than {100 * most:.2g} %. What it changes in the"
+        " others is known by MuJoCo's route alone, which takes steps of the same length in other coordinates; were both"
+        " to err alike, nothing here would show it."
     ]

@@ -476,9 +476,11 @@
       this.clock = make("output");
       bar.append(this.slider, this.clock);
       button("worst", "Go to the worst moment", () => this.set(this.worst));
-      button("+", "Zoom in on the time", () => this.zoom(0.5));
-      button("−", "Zoom out", () => this.zoom(2));
-      button("⟲", "Show the whole time", () => this.zoom(Infinity));
+      if (this.figures.some((figure) => figure.panels.length)) {
+        button("+", "Zoom in on the time", () => this.zoom(0.5));
+        button("−", "Zoom out", () => this.zoom(2));
+        button("⟲", "Show the whole time", () => this.zoom(Infinity));
+      }
       this.slider.addEventListener("input", () => this.set(Number(this.slider.value)));
       article.querySelector("h4").before(bar);
       this.tell();

@@ -1,0 +1,75 @@
+"""A campaign's cases, run and printed; figures of a case are drawn while the next ones are computed."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from contextlib import closing, nullcontext
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from workbench.drawing_process import DrawingProcess
+from workbench.processes import cores
+
+if TYPE_CHECKING:
+    from workbench.campaign.evidence import Effort
+    from workbench.campaign.spec import Campaign
+
+WORTH_IT = 4
+"""Cases from which on a process that draws meanwhile pays: what it draws with takes a second to load."""
+
+
+def run_cases_and_print(
+    spec: Campaign,
+    campaign: str | Path,
+    effort: Callable[[], Effort],
+    *,
+    pictures: bool,
+    only: Sequence[str],
+    **options: Any,
+) -> int:
+    """Run a campaign without a sweep, or cases of one with a sweep, and print its outcome.
+
+    Parameters
+    ----------
+    spec, campaign
+        The campaign, and what it was read from.
+    effort
+        Says how much evidence is gathered; called when the process that draws has begun.
+    pictures
+        Whether the robot is drawn.
+    only, options
+        As of `workbench.campaign.run.run_campaign`.
+
+    Returns
+    -------
+    int
+        The exit code.
+    """
+    # begun before what computes is loaded, which takes as long as to load what draws
+    worth = cores() > 1 and len(only or spec.case) >= WORTH_IT
+    with closing(DrawingProcess()) if worth else nullcontext() as drawing:
+        from workbench.campaign.run import run_campaign
+        from workbench.console import print_outcome
+        from workbench.diagnosis.brief import brief
+        from workbench.rendering.run_pictures import RunPictures
+        from workbench.report import build_report
+        from workbench.sweep.pick import pick_cases
+        from workbench.terminal import CaseProgress
+
+        with CaseProgress() as progress:
+            outcome = run_campaign(
+                campaign,
+                only=only,
+                progress=progress,
+                report=partial(build_report, drawn=drawing.drawn) if drawing else build_report,
+                pictures=RunPictures() if pictures else None,
+                drawing=drawing,
+                effort=dataclasses.replace(effort(), threads=cores()),  # one case after the other: each may take all
+                pick=pick_cases,
+                explain=brief,
+                **options,
+            )
+        print_outcome(outcome)
+    return outcome.conclusion.exit_code

@@ -1,0 +1,213 @@
+"""Figures drawn by a process of its own while a run computes: the same bytes, and nobody waits for it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from small_campaign import CANDIDATES, CASE, CASES, HEAD, MOTION, listing
+from workbench import drawing_process, processes
+from workbench.campaign.evidence import Effort
+from workbench.campaign.run import run_campaign
+from workbench.commands import run_cases
+from workbench.drawing_process import DrawingProcess
+from workbench.report import build_report
+from workbench.report import plot as plot_module
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
+FIGURES = """
+[[figure]]
+id = "one"
+title = "Of the first case"
+kind = "torque"
+case = "first"
+joint = "q2"
+curves = ["cand:lumped", "ref:distributed"]
+
+[[figure]]
+id = "One"
+title = "Of the second case"
+kind = "platform"
+case = "second"
+"""
+QUICK = Effort(budget=False)
+OF_A_CASE = 10
+"""figures: three of the motion, one for each joint, signed, spent, mechanism, reactions"""
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> Path:
+    path = tmp_path / "small.toml"
+    path.write_text(HEAD + FIGURES + CANDIDATES + CASES)
+    return path
+
+
+@pytest.fixture
+def drawn_here(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Keys of the figures that this process draws."""
+    keys: list[str] = []
+    draw = plot_module.svg_of
+
+    def noted(figure: Any, key: str) -> str:
+        keys.append(key)
+        return draw(figure, key)
+
+    monkeypatch.setattr(plot_module, "svg_of", noted)
+    return keys
+
+
+@contextlib.contextmanager
+def drawing() -> Iterator[DrawingProcess]:
+    process = DrawingProcess()
+    try:
+        yield process
+    finally:
+        process.close()
+    assert process._process is None or process._process.poll() is not None
+
+
+def alone(campaign: Path, out: Path) -> dict[str, bytes]:
+    run_campaign(campaign, out, report=build_report, effort=QUICK)
+    return files(out)
+
+
+def files(out: Path) -> dict[str, bytes]:
+    """What a report holds, without the page's head and foot, which tell the time."""
+    found = {f"figures/{path.name}": path.read_bytes() for path in sorted((out / "figures").iterdir())}
+    page = (out / "report.html").read_text(encoding="utf-8")
+    found["drawings"] = "".join(page.split("<svg")[1:]).partition("<section")[0].encode()
+    return found
+
+
+def test_what_was_drawn_meanwhile_is_taken_and_is_the_same(
+    campaign: Path, tmp_path: Path, drawn_here: list[str]
+) -> None:
+    wanted = alone(campaign, tmp_path / "alone")
+    every, told = set(drawn_here), set[str]()
+    drawn_here.clear()
+
+    with drawing() as process:
+
+        def report(stage: Path) -> None:
+            while len(process.drawn) < 2 * OF_A_CASE + 2 and process._process and process._process.poll() is None:
+                time.sleep(0.02)
+            told.update(key for key, _ in process.drawn)
+            build_report(stage, drawn=process.drawn)
+
+        run_campaign(campaign, tmp_path / "beside", report=report, drawing=process, effort=QUICK)
+    assert len(told) == 2 * OF_A_CASE + 1  # both figures have the key that the first of that name has
+    assert set(drawn_here) == every - told | {"figure-one-2"}
+    assert files(tmp_path / "beside") == wanted
+
+
+def test_drawings_of_something_else_are_not_taken(campaign: Path, tmp_path: Path, drawn_here: list[str]) -> None:
+    campaign.write_text(HEAD + CANDIDATES + CASE)
+    wanted = alone(campaign, tmp_path / "run")
+    drawn_here.clear()
+    keys = [path.stem for path in (tmp_path / "run" / "figures").iterdir()]
+    digest = "0" * 64
+    build_report(tmp_path / "run", drawn={(key, digest): "<svg>of another run</svg>" for key in keys})
+    assert sorted(drawn_here) == sorted(keys)
+    assert files(tmp_path / "run") == wanted
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import os; os._exit(3)",
+        "import time; time.sleep(600)",
+        "import sys; sys.stdin.readline(); print('{\"key\": 1')",
+        "import sys; sys.stdin.close(); print('no JSON', flush=True); import time; time.sleep(600)",
+    ],
+    ids=["ends", "hangs", "breaks off", "says nonsense"],
+)
+def test_a_run_waits_for_nobody(campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str) -> None:
+    popen = subprocess.Popen
+    monkeypatch.setattr(drawing_process, "popen", lambda _, **options: popen([sys.executable, "-c", code], **options))
+    with drawing() as process:
+        run_campaign(
+            campaign,
+            tmp_path / "beside",
+            drawing=process,
+            report=lambda stage: build_report(stage, drawn=process.drawn),
+        )
+    assert len(list((tmp_path / "beside" / "figures").glob("*.svg"))) > 2 * OF_A_CASE
+
+
+def test_a_process_that_cannot_be_started_is_done_without(
+    campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        raise OSError("no room")
+
+    monkeypatch.setattr(drawing_process, "popen", refuse)
+    with drawing() as process:
+        run_campaign(campaign, tmp_path / "beside", drawing=process, only=["first"], effort=QUICK)
+        assert process.drawn == {}
+
+
+def test_it_ends_with_the_run_that_began_it_and_runs_no_code_from_where_it_is(tmp_path: Path) -> None:
+    for name in ("json", "matplotlib", "numpy", "sitecustomize", "signal"):
+        (tmp_path / f"{name}.py").write_text("open('ran', 'w')")
+    (tmp_path / "matplotlibrc").write_text("figure.dpi: nonsense")
+    code = (
+        "from workbench.drawing_process import DrawingProcess; import os, time; p = DrawingProcess();"
+        " print(p._process.pid, flush=True); p.case({}); time.sleep(600)"
+    )
+    with subprocess.Popen(
+        processes.python_code(code), cwd=tmp_path, env=processes.environment(), stdout=subprocess.PIPE, text=True
+    ) as parent:
+        assert parent.stdout is not None
+        number = int(parent.stdout.readline())
+        parent.kill()
+    while alive(number):
+        time.sleep(0.02)
+    assert sorted(listing(tmp_path)) == sorted(
+        ["json.py", "matplotlib.py", "numpy.py", "sitecustomize.py", "signal.py", "matplotlibrc"]
+    )
+
+
+def alive(number: int) -> bool:
+    """Whether a process runs; one that has ended and that nobody has asked after does not."""
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    status = Path(f"/proc/{number}/stat")
+    return not (status.exists() and status.read_text().rpartition(")")[2].split()[0] == "Z")
+
+
+def test_the_command_has_figures_drawn_meanwhile_where_that_pays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[int] = []
+
+    class Noted(DrawingProcess):
+        def __init__(self) -> None:
+            begun.append(1)
+            super().__init__()
+
+    monkeypatch.setattr(run_cases, "DrawingProcess", Noted)
+    monkeypatch.setattr(run_cases, "cores", lambda: 2)
+    monkeypatch.chdir(tmp_path)
+    more = "".join(f'\n[[case]]\nname = "more_{n}"\n{MOTION}' for n in range(run_cases.WORTH_IT - 2))
+    (tmp_path / "small.toml").write_text(HEAD + CANDIDATES + CASES + more)
+    from workbench.commands.run import run
+
+    with contextlib.redirect_stdout(None):
+        run("small.toml", quick=True, pictures=False, only=["first"], out=tmp_path / "one")
+        assert begun == []
+        run("small.toml", quick=True, pictures=False, out=tmp_path / "all")
+    assert begun == [1]
+    kept = json.loads((tmp_path / "all" / "drawn.json").read_text())
+    assert len(kept["drawings"]) > run_cases.WORTH_IT * OF_A_CASE
