@@ -19,6 +19,8 @@ from workbench.reference.closure import LoopCloser
 from workbench.reference.kinematics import is_covered, place, room
 
 RANDOM = 12
+WITH_FREE_JOINT = 12
+"""seed"""
 ROUNDING = 1e-13
 """m: what two programs that place the same robots of a metre differ by"""
 SAME = 1e-11
@@ -77,6 +79,21 @@ def test_places_and_motion_vectors_are_those_of_mujoco(tmp_path: Path) -> None:
         assert differences(reference, number) < 10 * ROUNDING
         kinds |= set(reference.compiled().jnt_type.tolist())
     assert {mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE} <= kinds
+
+
+def test_places_of_a_body_on_a_free_joint_are_those_of_mujoco(tmp_path: Path) -> None:
+    """In a file that says itself what drives it; where a campaign does, free joints are taken apart before."""
+    drawn = draw(WITH_FREE_JOINT)
+    assert drawn is not None
+    path = tmp_path / "model.xml"
+    path.write_text(drawn.text, encoding="utf-8")
+    reference = wb.MujocoReference(path)
+    assert mujoco.mjtJoint.mjJNT_FREE in reference.compiled().jnt_type
+    for seed in range(4):
+        assert differences(reference, seed) < 10 * ROUNDING
+    mechanism = reference._closer.mechanism
+    assert mechanism is not None
+    assert differences(reference, 0, body_pos=mechanism.kinematics.body_pos + 1e-6) > 1e-8
 
 
 @pytest.mark.parametrize("table", ["body_pos", "joint_pos", "joint_axis", "body_quat", "start"])

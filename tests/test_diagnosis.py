@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -274,12 +272,12 @@ def test_the_command_line_says_and_counts_findings(repository: Path, tmp_path: P
     assert "ma: x 2 in weight" in " ".join(done.out.split())
     data = json.loads((tmp_path / "found.json").read_text())
     os.mkfifo(tmp_path / "pipe")  # a device or a pipe is not replaced: as root this took /dev/null from the system
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)  # who writes into it does not wait for ever
     for option in ("--json", "--apply"):
-        done = subprocess.run(
-            [sys.executable, "-m", "workbench.cli", "diagnose", campaign, "--candidates", path, option, "pipe"],
-            cwd=tmp_path, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert (done.returncode, "pipe: is no regular file; name a file" in done.stderr) == (2, True), done
+        done = workbench("diagnose", campaign, "--candidates", path, option, "pipe")
+        assert (done.code, "pipe: is no regular file; name a file" in done.err) == (2, True), done
+    assert os.read(reader, 1) == b""
+    os.close(reader)
     assert (tmp_path / "pipe").is_fifo()
     assert data["format"] == 1
     assert data["diagnoses"][0]["findings"][0]["parameters"] == ["ma"]

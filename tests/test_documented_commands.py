@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,7 @@ PATIENCE = 300
 """seconds that any command may take before the test fails instead of hanging"""
 
 
+@cache
 def root() -> typer.main.click.Command:
     return typer.main.get_command(app)
 

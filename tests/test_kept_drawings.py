@@ -88,6 +88,7 @@ def broken(run: Path) -> None:
     (run / kept_drawings.NAME).write_text("[]", "utf-8")
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("spoil", [tampered, forged, other_results, gone, broken])
 def test_other_drawings_are_drawn_anew(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spoil: Callable[[Path], None]

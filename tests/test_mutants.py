@@ -159,10 +159,18 @@ def test_what_survives_a_short_run_has_to_survive_longer_tests(monkeypatch: pyte
 def test_the_references_kernels_divide_by_zero_uncompiled_as_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     from types import FunctionType
 
+    from numba.experimental import structref
+
     from workbench import compiled
 
-    for name in ("compiled", "inlined", "merged"):
+    public = {
+        name for name, one in vars(compiled).items() if isinstance(one, FunctionType) and not name.startswith("_")
+    }
+    assert {name for name in public if vars(compiled)[name].__module__ == compiled.__name__} == set(trial.DECORATORS)
+    for name in trial.DECORATORS:
         monkeypatch.setattr(compiled, name, getattr(compiled, name))
+    for name in ("StructRefProxy", "register", "define_proxy"):
+        monkeypatch.setattr(structref, name, getattr(structref, name))
     monkeypatch.setattr("numpy.seterr", lambda **_: None)
     trial.interpret()
     scope = {"math": math, "__name__": "workbench.reference.of_a_test"}

@@ -12,6 +12,7 @@ from nbclient import NotebookClient
 
 from tutorial import normalised
 
+pytestmark = pytest.mark.slow
 LIGHT = 150_000
 """Bytes: outputs are kept as long as nobody minds them in a clone."""
 

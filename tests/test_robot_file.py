@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
 from slider_crank import ROBOT, write_slider
 from small_campaign import Workbench
+from workbench.errors import SpecError
+from workbench.robots.catalogue import robot_beside
 from workbench.robots.places import _product
 
 MISTAKES = {
@@ -87,3 +90,19 @@ def test_the_file_itself_is_right(workbench: Workbench) -> None:
 )  # fmt: skip
 def test_signs_and_factors_of_a_place(text: str, factor: float, names: tuple[str, ...]) -> None:
     assert _product(text, "here") == (factor, names)
+
+
+def test_a_robot_file_beside_a_model_speaks_for_that_model_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "robot"
+    shutil.copytree(Path(__file__).resolve().parents[1] / "examples" / "fivebar", folder)
+    found = robot_beside(folder / "fivebar.xml")
+    assert found is not None
+    assert found.model.resolve() == (folder / "fivebar.xml").resolve()
+    other = folder / "other.xml"
+    shutil.copy(folder / "fivebar.xml", other)
+    assert robot_beside(other) is None
+    (folder / "robot.toml").write_text("format = 1\n", encoding="utf-8")
+    with pytest.raises(SpecError, match=r"robot\.toml"):
+        robot_beside(folder / "fivebar.xml")
+    (folder / "robot.toml").unlink()
+    assert robot_beside(folder / "fivebar.xml") is None

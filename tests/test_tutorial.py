@@ -27,6 +27,7 @@ SPOILED = [
 ]
 
 
+@pytest.mark.slow
 def test_commands_run_as_written_give_what_is_shown(repository: Path, tmp_path: Path) -> None:
     directory, commands = tmp_path / "slider_crank", tmp_path / "bin"
     directory.mkdir()

@@ -110,6 +110,7 @@ SHORT_TESTS: dict[str, tuple[str, ...]] = {
 
 UNCOMPILED_TESTS: dict[str, tuple[str, ...]] = {
     "reference/forward": ("plant_terms",),
+    "reference/kinematics": ("compiled_closure", *LOOPS),
     "reference/linear": ("reference_linear", "closure_kinds"),
     "reference/platform_": ("task_coordinates",),
     "reference/sides": ("sides",),

@@ -30,6 +30,9 @@ LIBRARIES = (
     "jinja2", "yaml", "portalocker", "hypothesis", "hypothesis.strategies", "pytest", "coverage",
 )  # fmt: skip
 
+DECORATORS = ("compiled", "borrowing", "inlined", "merged")
+"""of `workbench.compiled`: what makes machine code of a function"""
+
 KILLED, SURVIVED, TIMED_OUT, BROKEN = "killed", "survived", "timed out", "broken"
 
 
@@ -182,7 +185,7 @@ def interpret() -> None:
 
         return decorated
 
-    for name in ("compiled", "inlined", "merged"):
+    for name in DECORATORS:
         setattr(compiled, name, plain_or(getattr(compiled, name)))
 
     class Plain:
