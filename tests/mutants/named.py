@@ -54,7 +54,7 @@ NAMED: dict[str, Named] = {
     "sides not looked at, second engine": Named(PINOCCHIO, "if small and self._same_side(jacobian, after) else None", "if small else None"),
     "rows that turn over are a jump": Named(SIDES, "same[s] &= volume >= 0.0 and not negative", "same[s] = False"),
     "rows that turn over are no jump": Named(SIDES, "same[s] &= volume >= 0.0 and not negative", "same[s] = True"),
-    "sign of a pivot dropped": Named(SIDES, "negative ^= a[k, k] < 0.0", "negative ^= False"),
+    "sign of a pivot dropped": Named(SIDES, "negative ^= head < 0.0", "negative ^= False"),
     "CORRECTION x 100, second engine": Named(PINOCCHIO, "CORRECTION = 0.1", "CORRECTION = 10.0"),
     "LONGEST_STEP x 100, second engine": Named(PINOCCHIO, "LONGEST_STEP = 0.2", "LONGEST_STEP = 20.0"),
     # checks of a model

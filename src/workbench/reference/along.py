@@ -25,7 +25,7 @@ from workbench.reference.engine import Evaluator
 from workbench.reference.kinds import SCALAR
 from workbench.reference.structure import Structure
 
-CHUNK = 576
+CHUNK = 1280
 """Samples of a motion that are followed one after the other; chunks are shared by threads."""
 
 SAME = 1e-6
@@ -104,7 +104,7 @@ class OrderedClosure(Continuation):
         Where such a sample is not what the chunk before leads to, its chunk is followed again from there.
         """
         n, rules = len(q), self.rules()
-        q = np.array(q)
+        q = np.array(q, order="C")  # in one order, for which the kernels are compiled
         found, firsts = self._nothing(n, q.shape[1]), np.arange(0, n, CHUNK)
         home, row = np.tile(self.start, (len(firsts), 1)), np.zeros(len(firsts), dtype=np.int64)
         self._reach(q, firsts[:1], self._home, home[:1], row[:1], found)

@@ -84,9 +84,12 @@ class Bench(NamedTuple):
     step: FloatArray
     bend: FloatArray
     """``(nv,)`` added to the first prediction before Newton begins: what the tangent's own change is worth"""
-    best: FloatArray
-    """``(3,)`` least residual met; how far the last factor was taken from where Newton begins (see `BESIDE`); closings
-    of the sample now followed"""
+    least: FloatArray
+    """``(1,)`` least residual met in the closing now under way"""
+    away: FloatArray
+    """``(1,)`` how far from where Newton begins the last factor was taken, see `BESIDE`; infinite: it is of no use"""
+    closings: FloatArray
+    """``(1,)`` closings of the sample now followed"""
     corrected: FloatArray
     """``(5, nv)`` by what Newton moved the sample that is closed; by what the last three were off what their tangents
     and the change of these foretold, the latest first; and what of that was carried on to the sample"""
@@ -107,5 +110,5 @@ def bench(mechanism: Mechanism) -> Bench:
         np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros(2, dtype=np.int64),
         np.zeros((m, nv)), np.zeros((1, m, nv)), np.zeros((1, m, nv)), np.zeros(1, dtype=np.bool_),
         np.zeros((p, p)), np.zeros(m), *room_to_factor(m, p, na + 1), np.zeros(p), np.zeros(nv), np.zeros(nv),
-        np.array([0.0, math.inf, 0.0]), np.zeros((5, nv)), np.zeros((4, na)),
+        np.zeros(1), np.full(1, math.inf), np.zeros(1), np.zeros((5, nv)), np.zeros((4, na)),
     )  # fmt: skip

@@ -89,13 +89,13 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     """Newton on the passive joints from `Bench.qpos`, which is overwritten.
 
     The best configuration met goes to `Bench.kept`, its residual to `Bench.facts`; where it is closed, also tangent,
-    rank, condition and weakest freedom. Near the pose of the last factor, as ``Bench.best[1]`` says, steps are taken
+    rank, condition and weakest freedom. Near the pose of the last factor, as `Bench.away` says, steps are taken
     with it as long as they converge; facts and tangent are always those of a factor of the closed pose itself.
     """
     passive, actuated, qpos, step, x = mechanism.passive, mechanism.actuated, w.qpos, w.step, w.x
     limits = (rules.closed, rules.floor, rules.astray, rules.settles)
-    beside = w.best[1] <= BESIDE and w.facts[1] == passive.shape[0] and not rules.settles
-    w.best[0] = math.inf
+    beside = w.away[0] <= BESIDE and w.facts[1] == passive.shape[0] and not rules.settles
+    w.least[0] = math.inf
     w.sides[0] = UNKNOWN
     found = np.int64(w.facts[1])
     w.facts[2], w.facts[3] = math.inf, 0.0
@@ -104,11 +104,11 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     chord, last = beside, math.inf
     for _ in range(rules.steps):
         _placed(mechanism, w, qpos)
-        again, good = keep_if_better(w.residual, limits, qpos, w.kept, w.best, 0)
+        again, good = keep_if_better(w.residual, limits, qpos, w.kept, w.least, 0)
         if not (again or good):
             break
-        chord = chord and not good and w.best[0] <= DRAWN * last
-        last = w.best[0]
+        chord = chord and not good and w.least[0] <= DRAWN * last
+        last = w.least[0]
         if chord:
             for i in range(w.residual.shape[0]):
                 w.residual[i] = -w.residual[i]
@@ -133,10 +133,10 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
         if good and beside and longest <= ROUNDED:
             _copy(qpos, w.kept)
             break
-    w.facts[0] = w.best[0]
-    if not w.best[0] <= rules.closed:
+    w.facts[0] = w.least[0]
+    if not w.least[0] <= rules.closed:
         w.facts[1] = 0.0
-    w.best[1] = math.inf
+    w.away[0] = math.inf
 
 
 @merged
@@ -195,7 +195,7 @@ def _follow_line(mechanism, rules, w, target, chain, factored):  # type: ignore[
     for j in range(na):
         way[j] = target[j] - origin[j]
     done, step = 0.0, 1.0
-    w.best[2] = 0.0
+    w.closings[0] = 0.0
     while done < 1.0:
         follow_tangent(w.tangent_here, way, w.step)
         longest = rules.almost * rules.longest / _length(w.step, mechanism.weights)
@@ -213,8 +213,8 @@ def _follow_line(mechanism, rules, w, target, chain, factored):  # type: ignore[
         integrate(w.here, w.step, mechanism.joints, w.qpos)
         for j in range(na):
             w.qpos[mechanism.actuated_qpos[j]] = w.predicted[mechanism.actuated_qpos[j]] = aim[j]
-        w.best[1] = moved if factored else math.inf
-        w.best[2] += 1.0
+        w.away[0] = moved if factored else math.inf
+        w.closings[0] += 1.0
         close_one(mechanism, rules, w)
         squared = 0.0
         for i in range(w.here.shape[0]):
@@ -295,7 +295,7 @@ def _miss(mechanism, w, known):  # type: ignore[no-untyped-def]
 
     None where loops leave a joint free: nothing would take back what was foretold of it.
     """
-    if w.best[2] > 1.0 or w.facts_here[1] < mechanism.passive.shape[0]:
+    if w.closings[0] > 1.0 or w.facts_here[1] < mechanism.passive.shape[0]:
         return 0
     for d in range(w.bend.shape[0]):
         w.corrected[3, d], w.corrected[2, d] = w.corrected[2, d], w.corrected[1, d]
@@ -323,7 +323,7 @@ def advance(  # type: ignore[no-untyped-def]
     for s in range(first, last):
         if how == NEAR:
             _copy(start[s], w.qpos)
-            w.best[1] = math.inf
+            w.away[0] = math.inf
             close_one(mechanism, rules, w)
             _copy(w.kept, w.here)
             _copy(w.facts, w.facts_here)

@@ -213,8 +213,8 @@ class LoopCloser(OrderedClosure):
         done = np.zeros(len(target))
         rules = self.rules(marked_below or SMALLEST_STEP)
         advance(
-            self.mechanism, rules, bench(self.mechanism), LINES, np.array(origin), np.array(target), 0, len(target),
-            *here.arrays, done,
+            self.mechanism, rules, bench(self.mechanism), LINES, np.array(origin, order="C"),
+            np.array(target, order="C"), 0, len(target), *here.arrays, done,
         )  # fmt: skip
         if (done < 1.0).any() and not marked_below:
             row = int(np.argmax(done < 1.0))

@@ -329,7 +329,7 @@ def _close_at(mechanism, rules, w, r, q, time):  # type: ignore[no-untyped-def]
     for j in range(q.shape[0]):
         w.predicted[mechanism.actuated_qpos[j]] = q[j]
     _copy(w.predicted, w.qpos)
-    w.best[1] = math.sqrt(moved) if time > 0.0 else math.inf  # where a run begins nothing was factored
+    w.away[0] = math.sqrt(moved) if time > 0.0 else math.inf  # where a run begins nothing was factored
     close_one(mechanism, rules, w)
     for i in range(w.here.shape[0]):
         squared += ((w.kept[i] - w.predicted[i]) * mechanism.coordinate_weights[i]) ** 2

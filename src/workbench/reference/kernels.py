@@ -14,7 +14,13 @@ from workbench.arrays import FloatArray
 from workbench.compiled import borrowing, compiled, inlined
 from workbench.reference.kinds import BALL, CONNECT, FREE, WELD
 from workbench.reference.linear import Lengths, factor, room_to_factor, solve, solve_beside, solve_transposed
-from workbench.reference.rows import acceleration_rows, body_motion, constraint_rows, point_motion
+from workbench.reference.rows import (
+    acceleration_rows,
+    body_accelerations,
+    body_velocities,
+    constraint_rows,
+    point_motion,
+)
 from workbench.reference.sides import UNKNOWN, side_of
 
 
@@ -195,7 +201,7 @@ def projection_room(rows: int, freedoms: int, passive: int, bodies: int) -> Proj
 def projection(  # type: ignore[no-untyped-def]
     closures, joints, split, bodies, poses, dynamics, mass_layout, platform, masses, gravity, base_rotation,
     base_position, qpos, qvel, tangent, qdd, applied, qacc, tau, closure_residual, velocity_residual,
-    acceleration_residual, motion, turning, reactions, slack, room,
+    acceleration_residual, motion, turning, reactions, slack, first, room,
 ):  # fmt: skip
     """Accelerations, actuator torques, platform motion and reaction forces of a block.
 
@@ -230,7 +236,8 @@ def projection(  # type: ignore[no-untyped-def]
             open_by = math.inf if math.isnan(res[i]) else max(open_by, abs(res[i]))
         closure_residual[s], velocity_residual[s] = open_by, worst
         follow_tangent(tangent[s], qdd[s], qacc[s])
-        body_motion(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], v, acc)
+        body_velocities(bodies, cdof[s], qvel[s], v)
+        body_accelerations(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], acc)
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
         for i in range(m):
             a[i, p] = -rates[i]
@@ -240,7 +247,7 @@ def projection(  # type: ignore[no-untyped-def]
         solve_beside(a, p, rank)
         for k in range(p):
             qacc[s, passive[perm[k]]] += a[k, p]
-        body_motion(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], v, acc)
+        body_accelerations(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], acc)
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
         worst = 0.0
         for i in range(m):
@@ -278,13 +285,13 @@ def projection(  # type: ignore[no-untyped-def]
         px, py, pz = px - base_position[0], py - base_position[1], pz - base_position[2]
         for k in range(3):
             rx, ry, rz = base_rotation[0, k], base_rotation[1, k], base_rotation[2, k]
-            motion[0, s, k] = px * rx + py * ry + pz * rz
-            motion[1, s, k] = vx * rx + vy * ry + vz * rz
-            motion[2, s, k] = ax * rx + ay * ry + az * rz
+            motion[0, first + s, k] = px * rx + py * ry + pz * rz
+            motion[1, first + s, k] = vx * rx + vy * ry + vz * rz
+            motion[2, first + s, k] = ax * rx + ay * ry + az * rz
         _turning(base_rotation, site_xquat[s, site], v[body], acc[body], turning, s)
         _reactions(
             blocks, block_rows, bodies, masses, gravity, base_rotation, body, com[s], body_com[s], v, acc, multipliers,
-            applied[s], carried, reactions, s,
+            applied[s], carried, reactions, first + s,
         )  # fmt: skip
 
 

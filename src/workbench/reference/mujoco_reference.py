@@ -279,9 +279,8 @@ class MujocoReference(PlatformSide):
                 *self._tables, poses.tables, dynamics.tables, self._mass_layout, platform, masses, gravity,
                 self._base_rotation, self._base_position, qpos[rows], qvel[rows], assembly.tangent[rows], qdd[rows],
                 force[rows], qacc[rows], tau[rows], closure_residual[rows], velocity_residual[rows],
-                acceleration_residual[rows], motion[:, rows], (turning[0][rows], turning[1][rows], turning[2][rows]),
-                reactions[:, rows], slack[rows],
-                projection_room(structure.rows, model.nv, len(structure.passive), model.nbody),
+                acceleration_residual[rows], motion, tuple(array[rows] for array in turning), reactions, slack[rows],
+                rows.start, projection_room(structure.rows, model.nv, len(structure.passive), model.nbody),
             )  # fmt: skip
             energy[rows] = dynamics.energy[: rows.stop - rows.start]
 

@@ -13,7 +13,7 @@ import numpy as np
 from workbench.compiled import compiled
 from workbench.reference.kernels import integrate, keep_if_better
 from workbench.reference.linear import factor, solve
-from workbench.reference.rows import acceleration_rows, body_motion, constraint_rows
+from workbench.reference.rows import acceleration_rows, body_accelerations, body_velocities, constraint_rows
 from workbench.reference.sides import UNKNOWN, side_of
 from workbench.reference.task_rows import task_acceleration, task_rows
 
@@ -123,8 +123,9 @@ def platform_accelerations(  # type: ignore[no-untyped-def]
             for j in range(given):
                 value += tangent[s, d, j] * xdd[s, j]
             qacc[s, d] = value
+        body_velocities(bodies, cdof[s], qvel[s], v)
         for turn in range(2):
-            body_motion(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], v, acc)
+            body_accelerations(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], acc)
             acceleration_rows(
                 closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates
             )

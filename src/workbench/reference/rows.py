@@ -139,18 +139,44 @@ def constraint_rows(closures, joints, qpos, cdof, com, site_xpos, site_xquat, an
 
 
 @inlined
-def body_motion(bodies, cdof, cdof_dot, qvel, qacc, v, a):  # type: ignore[no-untyped-def]
-    """Spatial velocity and acceleration ``(nbody, 6)`` about the centre of mass of each tree, without gravity."""
+def body_velocities(bodies, cdof, qvel, v):  # type: ignore[no-untyped-def]
+    """Spatial velocities ``(nbody, 6)`` about the centre of mass of each tree."""
     parent, root, first, number = bodies
     for b in range(parent.shape[0]):
-        carried = b > 0 and root[parent[b]] == root[b]
-        for i in range(6):
-            v[b, i] = v[parent[b], i] if carried else 0.0
-            a[b, i] = a[parent[b], i] if carried else 0.0
+        p = parent[b]
+        # sums are kept in six numbers, since what is written into an array may be what is read next
+        v0, v1, v2, v3, v4, v5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        if b > 0 and root[p] == root[b]:
+            v0, v1, v2, v3, v4, v5 = v[p, 0], v[p, 1], v[p, 2], v[p, 3], v[p, 4], v[p, 5]
         for d in range(first[b], first[b] + number[b]):
-            for i in range(6):
-                v[b, i] += cdof[d, i] * qvel[d]
-                a[b, i] += cdof_dot[d, i] * qvel[d] + cdof[d, i] * qacc[d]
+            rate = qvel[d]
+            v0 += cdof[d, 0] * rate
+            v1 += cdof[d, 1] * rate
+            v2 += cdof[d, 2] * rate
+            v3 += cdof[d, 3] * rate
+            v4 += cdof[d, 4] * rate
+            v5 += cdof[d, 5] * rate
+        v[b, 0], v[b, 1], v[b, 2], v[b, 3], v[b, 4], v[b, 5] = v0, v1, v2, v3, v4, v5
+
+
+@inlined
+def body_accelerations(bodies, cdof, cdof_dot, qvel, qacc, a):  # type: ignore[no-untyped-def]
+    """Spatial accelerations ``(nbody, 6)`` about the centre of mass of each tree, without gravity."""
+    parent, root, first, number = bodies
+    for b in range(parent.shape[0]):
+        p = parent[b]
+        a0, a1, a2, a3, a4, a5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        if b > 0 and root[p] == root[b]:
+            a0, a1, a2, a3, a4, a5 = a[p, 0], a[p, 1], a[p, 2], a[p, 3], a[p, 4], a[p, 5]
+        for d in range(first[b], first[b] + number[b]):
+            rate, rise = qvel[d], qacc[d]
+            a0 += cdof_dot[d, 0] * rate + cdof[d, 0] * rise
+            a1 += cdof_dot[d, 1] * rate + cdof[d, 1] * rise
+            a2 += cdof_dot[d, 2] * rate + cdof[d, 2] * rise
+            a3 += cdof_dot[d, 3] * rate + cdof[d, 3] * rise
+            a4 += cdof_dot[d, 4] * rate + cdof[d, 4] * rise
+            a5 += cdof_dot[d, 5] * rate + cdof[d, 5] * rise
+        a[b, 0], a[b, 1], a[b, 2], a[b, 3], a[b, 4], a[b, 5] = a0, a1, a2, a3, a4, a5
 
 
 @inlined

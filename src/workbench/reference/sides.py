@@ -59,10 +59,13 @@ NO_SIDES = SideTable(
 
 
 @inlined
-def _eliminate(a, mean):  # type: ignore[no-untyped-def]
-    """Whether the determinant of ``a (p, p)``, overwritten, is negative, and its size over ``mean^p``, -1 for zero."""
+def _eliminate(a, p, mean):  # type: ignore[no-untyped-def]
+    """Sign (whether it is negative) and size over ``mean^p``, -1 for zero, of a determinant.
+
+    It is that of the first p rows and columns of ``a``, which are overwritten. They are no view of their own: of a
+    view the compiler does not know that rows are in one piece.
+    """
     negative, volume = False, 1.0
-    p = a.shape[0]
     for k in range(p):
         pivot = k
         for i in range(k + 1, p):
@@ -72,12 +75,13 @@ def _eliminate(a, mean):  # type: ignore[no-untyped-def]
             negative = not negative
             for j in range(k, p):
                 a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-        if not abs(a[k, k]) > 0.0:
+        head = a[k, k]
+        if not abs(head) > 0.0:
             return False, -1.0
-        negative ^= a[k, k] < 0.0
-        volume *= abs(a[k, k]) / mean
+        negative ^= head < 0.0
+        volume *= abs(head) / mean
         for i in range(k + 1, p):
-            scale = a[i, k] / a[k, k]
+            scale = a[i, k] / head
             if scale != 0.0:
                 for j in range(k + 1, p):
                     a[i, j] -= scale * a[k, j]
@@ -96,11 +100,10 @@ def side_of(jac, rank, table, work):  # type: ignore[no-untyped-def]
     side = 0
     for block in range(starts.shape[0] - 1):
         first, size = starts[block], starts[block + 1] - starts[block]
-        a = work[:size, :size]
         for i in range(size):
             for j in range(size):
-                a[i, j] = jac[rows[first + i], columns[first + j]]
-        negative, volume = _eliminate(a, table.sizes[block])
+                work[i, j] = jac[rows[first + i], columns[first + j]]
+        negative, volume = _eliminate(work, size, table.sizes[block])
         if volume < table.least[block]:
             return UNKNOWN
         if negative:
@@ -120,16 +123,15 @@ def same_side(before, after, table, work, same):  # type: ignore[no-untyped-def]
         same[s] = True
         for block in range(table.starts.shape[0] - 1):
             first, size = table.starts[block], table.starts[block + 1] - table.starts[block]
-            a = work[:size, :size]
             mean = 1e-300
             for i in range(size):
                 for j in range(size):
                     value = 0.0
                     for r in range(table.group_starts[block], table.group_starts[block + 1]):
                         value += before[s, rows[r], columns[first + i]] * after[s, rows[r], columns[first + j]]
-                    a[i, j] = value
+                    work[i, j] = value
                     mean = max(mean, abs(value))
-            negative, volume = _eliminate(a, mean)
+            negative, volume = _eliminate(work, size, mean)
             same[s] &= volume >= 0.0 and not negative
 
 
