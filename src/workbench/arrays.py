@@ -18,7 +18,10 @@ def as_rows(name: str, value: ArrayLike, columns: int = 3) -> FloatArray:
     ArrayError
         Wrong shape or not numeric.
     """
-    array = np.ascontiguousarray(_real(name, value, f"(n, {columns})"))
+    if type(value) is np.ndarray and value.dtype == np.float64 and value.flags.c_contiguous:
+        array: FloatArray = value  # the usual case, of one sample again and again
+    else:
+        array = np.ascontiguousarray(_real(name, value, f"(n, {columns})"))
     if array.ndim != 2 or array.shape[1] != columns:
         raise ArrayError(f"{name}: expected shape (n, {columns}), got {array.shape}", argument=name, shape=array.shape)
     return array
@@ -84,11 +87,12 @@ def same_lengths(**arrays: FloatArray) -> tuple[FloatArray, ...]:
     ArrayError
         They do not; the message lists names and lengths.
     """
-    lengths = {name: len(array) for name, array in arrays.items()}
-    if len(set(lengths.values())) > 1:
+    found = tuple(arrays.values())
+    if any(len(array) != len(found[0]) for array in found):
+        lengths = {name: len(array) for name, array in arrays.items()}
         listed = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise ArrayError(f"arguments differ in their number of samples: {listed}", **lengths)
-    return tuple(arrays.values())
+    return found
 
 
 def as_force(name: str, value: ArrayLike | None, samples: int) -> FloatArray:
