@@ -164,8 +164,10 @@ def exponent(sizes: tuple[int, ...], values: list[float]) -> float:
 
 def draw(found: dict[str, list[tuple[float, float, float]]], sizes: dict[str, tuple[int, ...]], path: Path) -> None:
     """All series over their sizes, both as multiples of the smallest."""
+    import matplotlib as mpl
     from matplotlib.figure import Figure
 
+    mpl.rcParams |= {"svg.hashsalt": "growth", "svg.fonttype": "none"}
     figure = Figure(figsize=(6.4, 4.0))
     axes = figure.add_subplot()
     for what, rows in found.items():
@@ -177,7 +179,7 @@ def draw(found: dict[str, list[tuple[float, float, float]]], sizes: dict[str, tu
     for power in (1, 2, 3):
         axes.loglog(reach, reach**power, ":", color="0.6", linewidth=0.8)
     axes.set(xlabel="size, of the smallest", ylabel="CPU time, of the smallest's", ylim=(0.8, None))
-    axes.legend(frameon=False)
+    axes.legend(frameon=False, fontsize=8)
     figure.savefig(path, bbox_inches="tight", metadata={"Date": None})
 
 

@@ -42,6 +42,7 @@ class Asym2rssPpap(ClosedForm):
         """Build from the values of the robot's parameters, by name."""
         super().__init__(parameters)
         self._friction = Friction(parameters)
+        self._has_friction = bool(self._friction)  # asked with every sample
         self._constants = {model: kernel.pack(parameters, mass_model_of(model)) for model in self.mass_models}
 
     def forward_kinematics(self, q: ArrayLike) -> FloatArray:
@@ -252,7 +253,7 @@ class Asym2rssPpap(ClosedForm):
     @property
     def has_friction(self) -> bool:
         """Whether any joint has friction or a rotor."""
-        return bool(self._friction)
+        return self._has_friction
 
     def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
         """What the actuators must supply for friction and rotors; see `ClosedForm.friction` and docs/friction.md."""

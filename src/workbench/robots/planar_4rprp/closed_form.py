@@ -40,6 +40,7 @@ class Planar4Rprp(ClosedForm):
         """Build from the values of the robot's parameters, by name."""
         super().__init__(parameters)
         self._friction = Friction(parameters)
+        self._has_friction = bool(self._friction)  # asked with every sample
         self._constants = {model: kernel.pack(parameters, factor) for model, factor in BAR_INERTIA.items()}
 
     def forward_kinematics(self, q: ArrayLike) -> FloatArray:
@@ -266,7 +267,7 @@ class Planar4Rprp(ClosedForm):
     @property
     def has_friction(self) -> bool:
         """Whether any joint has friction or a rotor."""
-        return bool(self._friction)
+        return self._has_friction
 
     def friction(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
         """What the actuators must supply for friction and rotors; see `ClosedForm.friction` and docs/friction.md."""
