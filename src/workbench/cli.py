@@ -6,6 +6,8 @@ against a bound; 130: interrupted; 143, 129: ended by SIGTERM, SIGHUP.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import io
 import os
 import re
@@ -93,6 +95,9 @@ app.command()(studio)
 
 def main() -> NoReturn:
     """Run the command line; whatever goes wrong becomes one line and an exit code."""
+    # an interpreter that ends looks through all there is, several times: most of a second with the libraries of a run
+    atexit.unregister(gc.freeze)
+    atexit.register(gc.freeze)
     if _notice not in subscribers:
         subscribers.append(_notice)
     for stream in (sys.stdout, sys.stderr):
