@@ -175,10 +175,10 @@ def draw(found: dict[str, list[tuple[float, float, float]]], sizes: dict[str, tu
             continue
         x, y = np.array(sizes[what]) / sizes[what][0], np.array([row[0] for row in rows]) / rows[0][0]
         axes.loglog(x, y, "o-", label=f"{what} from {sizes[what][0]}")
-    reach = np.array(axes.get_xlim())
+    reach, most = np.array(axes.get_xlim()), 3.0 * axes.get_ylim()[1]
     for power in (1, 2, 3):
         axes.loglog(reach, reach**power, ":", color="0.6", linewidth=0.8)
-    axes.set(xlabel="size, of the smallest", ylabel="CPU time, of the smallest's", ylim=(0.8, None))
+    axes.set(xlabel="size, of the smallest", ylabel="CPU time, of the smallest's", ylim=(0.7, most))
     axes.legend(frameon=False, fontsize=8)
     figure.savefig(path, bbox_inches="tight", metadata={"Date": None})
 
