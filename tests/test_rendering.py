@@ -298,7 +298,7 @@ def test_a_run_keeps_a_still_and_a_film_of_its_first_case(drawing: Workbench, mo
     from PIL import Image
 
     monkeypatch.delenv("MUJOCO_GL", raising=False)
-    monkeypatch.setattr(run_pictures, "PATIENCE_S", 300.0)  # a busy machine draws no less
+    monkeypatch.setattr(film_drawing, "PATIENCE_S", 300.0)  # a busy machine draws no less
     assert drawing.run(SMALL, "--quick", "--out", "run").code == 0
     record = record_of(drawing, "run")
     assert (record["case"], record["note"]) == ("first", "")
