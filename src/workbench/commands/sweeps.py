@@ -76,13 +76,11 @@ class SweepProgress(Bar):
             err.print(plain_line(found, self._what), markup=False)
 
     def saying(self, what: str, does: Callable[P, R]) -> Callable[P, R]:
-        """Return *does*, which says *what* is being done when it is called: all is computed then."""
+        """Return *does*, which says on a terminal *what* is being done when it is called: all is computed then."""
 
         def said(*arguments: P.args, **named: P.kwargs) -> R:
             if err.is_terminal:
                 self._bar.update(self._task, note=what)
-            else:
-                err.print(what)
             return does(*arguments, **named)
 
         return said
