@@ -178,6 +178,15 @@ def cases(directory: Path) -> pd.DataFrame:
     return pd.read_parquet(directory / "cases").set_index("index")
 
 
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the limit needs Linux")
+def test_what_writes_series_is_no_cases_memory(workbench: Workbench) -> None:
+    # its library reserves a gigabyte of addresses when it is first used; one case takes 160 MB
+    tight = SWEEP.replace("time_limit = 20.0", "time_limit = 60.0\nmemory_limit = 512.0\nkeep_series = 'all'")
+    done = workbench.run(tight.replace("samples = 40", "samples = 3"), "--out", "run", "--jobs", "1")
+    assert done.code == 0, done
+    assert set(cases(workbench.directory / "run").status) <= {"passed", "filtered"}
+
+
 @pytest.mark.slow
 def test_each_faulty_case_has_one_status_and_all_others_are_done(
     workbench: Workbench, monkeypatch: pytest.MonkeyPatch

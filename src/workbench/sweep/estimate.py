@@ -146,7 +146,7 @@ def _of_cases(
     begun = time.perf_counter()
     result = compute_case(campaign, short, effort)
     seconds = (time.perf_counter() - begun) * len(cases)
-    size = len(series_bytes(result)) * samples / len(short.motion.t)
+    size = len(series_bytes(result.series)) * samples / len(short.motion.t)
     limits = limits_of(campaign, cases[0].robot, str(file))
     asked = tuple(f"{one.name} against {one.reference}" for one in campaign.candidate if one.bound is None)
     told = tuple(str(one.error) for one in missing)
