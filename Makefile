@@ -61,7 +61,7 @@ test: lint ## Check style and types, then run the tests (SLOW=1: all of them)
 	$(BIN)/pytest -n 2 --dist worksteal $(if $(SLOW),-m "(slow or not slow) and not long") $(PYTEST_ARGS)
 
 test-slow: $(STAMP) ## Run only the tests marked slow
-	$(BIN)/pytest -n 2 --dist loadfile -m "slow and not long" $(PYTEST_ARGS)
+	$(BIN)/pytest -m "slow and not long" $(PYTEST_ARGS)
 
 test-long: $(STAMP) ## Run the tests that take many minutes, by hand: all bad inputs, all commands among planted files
 	$(BIN)/pytest -m long $(PYTEST_ARGS)
