@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,6 +42,11 @@ def extrapolated(coarse: FloatArray, fine: FloatArray) -> FloatArray:
     """Coordinates at a step of zero, from those of a method of first order at a step and at its half."""
     found: FloatArray = 2.0 * fine - coarse
     return found
+
+
+def platform_row(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Of a run's rows that of the platform; None where the run does not track."""
+    return next((row for row in rows if row["joint"] == "platform"), None)
 
 
 def errors_in(row: Mapping[str, Any]) -> dict[str, float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.control.evaluate import Study, track
-from workbench.control.figures import error_of, errors_in, is_decided, uncertainty_of
+from workbench.control.figures import error_of, errors_in, is_decided, platform_row, uncertainty_of
 from workbench.control.loop import TRACKED
 from workbench.control.plan import Loop
 from workbench.errors import MotionError, WorkbenchError
@@ -73,7 +73,7 @@ def chosen(loops: Sequence[Loop], records: Sequence[Record]) -> tuple[int, ...]:
     errors: dict[int, float] = {}
     places: dict[tuple[object, ...], list[int]] = {}
     for number, (loop, record) in enumerate(zip(loops, records, strict=True)):
-        row = next((row for row in record.rows if row["joint"] == "platform"), None)
+        row = platform_row(record.rows)
         if record.status not in GOOD or row is None:
             continue
         known = uncertainty_of(errors_in(row))
@@ -112,8 +112,8 @@ def footage_of(study: Study, records: Sequence[Record]) -> Footage | None:
     desired, x_desired = bench.desired(loops[0].rate)
     courses, aways, rows = [], [], []
     for run, loop in zip(runs, loops, strict=True):
-        tracked = track(study, loop)
-        row = next(row for row in records[run].rows if row["joint"] == "platform")
+        tracked, row = track(study, loop), platform_row(records[run].rows)
+        assert row is not None  # a run that does not track is not chosen
         again = error_of(tracked.q, desired.q, tracked.x, x_desired) if tracked.status == TRACKED else None
         if again is None or abs(again.platform_rms - row["rms"]) > SAME * row["rms"]:
             found = tracked.status if again is None else f"errs by {again.platform_rms:.9g} m"

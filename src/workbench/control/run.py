@@ -19,7 +19,7 @@ from workbench.capabilities.robot import Robot
 from workbench.control import files as study_files
 from workbench.control.claims import HOLDS, NOT_ABOUT, Known, Verdict, judged
 from workbench.control.evaluate import Study, StudyContext, study_key
-from workbench.control.figures import errors_in, is_decided, uncertainty_of
+from workbench.control.figures import errors_in, is_decided, platform_row, uncertainty_of
 from workbench.control.files import STUDY
 from workbench.control.footage import Footage, footage_of
 from workbench.control.names import CONTROL
@@ -156,8 +156,7 @@ def known_runs(plan: StudyPlan, records: Sequence[Record]) -> list[Known]:
     for loop, record in zip(plan.loops, records, strict=True):
         if record.status not in GOOD:
             continue
-        row = next((row for row in record.rows if row["joint"] == "platform"), {})
-        found.append(Known(loop, errors_in(row)))
+        found.append(Known(loop, errors_in(platform_row(record.rows) or {})))
     return found
 
 

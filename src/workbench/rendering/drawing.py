@@ -51,7 +51,7 @@ class Drawing:
         model
             What is drawn.
         films
-            ``(films, n, nq)`` poses, n at most `FRAMES`.
+            ``(films, n, nq)`` poses, one a frame.
         ghosts
             ``(n, nq)`` poses that shine through all films.
         still

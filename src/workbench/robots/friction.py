@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -37,11 +36,6 @@ class DriveFriction:
 
     def __bool__(self) -> bool:
         """Tell whether any coefficient is not zero."""
-        return self._any
-
-    @cached_property
-    def _any(self) -> bool:
-        # asked for every call with one sample
         return bool(self.damping.any() or self.coulomb.any() or self.armature.any())
 
     def torques(self, qd: FloatArray, qdd: FloatArray) -> FloatArray:
