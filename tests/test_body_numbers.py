@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from workbench.robots.values import inertia_matrix
+from workbench.mjcf.text import scan
+from workbench.robots.parameters import Target
+from workbench.robots.places import WHOLE
+from workbench.robots.values import inertia_matrix, is_written
 
 PRINCIPAL = np.array([1e-3, 2.2e-3, 3e-3])
 
@@ -40,3 +43,20 @@ def test_inertia_in_the_axes_of_the_body(quaternion: list[float]) -> None:
     np.testing.assert_allclose(found, (turn * PRINCIPAL) @ turn.T, atol=1e-15)
     if quaternion[0] != 1:
         assert np.abs(found - np.diag(PRINCIPAL)).max() > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("attribute", "index", "written"),
+    [
+        ("size", 0, True),
+        ("size", 1, True),
+        ("size", 2, False),
+        ("size", WHOLE, True),
+        ("fromto", 0, False),
+        ("fromto", WHOLE, False),
+    ],
+)
+def test_a_number_is_written_where_the_file_has_so_many(attribute: str, index: int, written: bool) -> None:
+    text = '<mujoco><worldbody><geom name="post" type="cylinder" size="0.1 0.2"/></worldbody></mujoco>'
+    place = Target("geom", "post", attribute, index, 1.0, ("a",))
+    assert is_written(text, scan(text, "post.xml"), place) is written

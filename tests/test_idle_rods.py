@@ -144,6 +144,9 @@ def test_a_platform_rides_on_no_idle_spin(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace('<site name="off"/>', '<site name="off" pos="0 0 .1"/>'))
     with pytest.raises(ModelError, match='platform site "off" lies'):
         MujocoReference(path, setup=Setup(("crank",), "off"))
+    path.write_text(rod(inside='<site name="off" pos="0 0 .1"/><site name="end" pos=".3 .1 .1"/>'))
+    with pytest.raises(ModelError, match='platform site "off" lies'):  # the first of all sites
+        MujocoReference(path, setup=Setup(("crank",), "off"))
 
 
 def test_what_is_plainly_round_is_round_by_the_closer_look_too() -> None:

@@ -52,6 +52,8 @@ def test_mobility_by_gogus_count_and_by_rank(robot: Robot, reference: MujocoRefe
 def test_a_tilted_axis_changes_the_rank(robot: Robot):
     matrix = loop_matrix(robot.parameters, [[0.25, 0.22, 0.35]])
     assert np.linalg.matrix_rank(matrix, tol=1e-9) == 11
+    both = loop_matrix(robot.parameters, [[0.25, 0.22, 0.35], [0.2, 0.25, 0.3]])
+    assert both.tolist() == matrix.tolist()  # of the first pose
     tilted = matrix.copy()
     tilted[[0, 1, 2], -1] += tilted[[6, 7, 8], -1]
     tilted[7, -1] += 0.1  # the last revolute no longer parallel to its partner

@@ -26,7 +26,7 @@ from workbench.mjcf.text import (
     tokens,
     written,
 )
-from workbench.robots.description import Description
+from workbench.robots.description import COUNTS, Description
 from workbench.robots.parameters import Target
 from workbench.robots.places import WHOLE
 
@@ -70,8 +70,7 @@ def index_of(model: mujoco.MjModel, kind: mujoco.mjtObj, tag: str, name: str, fi
 
 def missing(model: mujoco.MjModel, kind: mujoco.mjtObj, tag: str, name: str) -> str:
     """What to say of an object that is not there."""
-    count = getattr(model, {"joint": "njnt", "text": "ntext"}.get(tag, f"n{tag}"), 0)
-    names = [mujoco.mj_id2name(model, kind, i) or "" for i in range(count)]
+    names = [mujoco.mj_id2name(model, kind, i) or "" for i in range(getattr(model, COUNTS[tag]))]
     return f'<{tag} name="{name}"> is missing{did_you_mean(name, [n for n in names if n])}'
 
 
