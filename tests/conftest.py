@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+# A script that starts the tests in the background hands them ignored signals, which their children would inherit: tests
+# that interrupt one would wait for ever. A handler of ours is the default again in a child.
+for _name in ("SIGINT", "SIGHUP", "SIGQUIT"):
+    _signal = getattr(signal, _name, None)
+    if _signal is not None and signal.getsignal(_signal) is signal.SIG_IGN:
+        signal.signal(_signal, signal.default_int_handler)
 
 # Compiling a kernel makes the first example slow, so no deadline and no complaint of slow drawing, which is the
 # machine's load; the same examples each time, so no flaky runs.
