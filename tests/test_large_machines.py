@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from workbench.importing.proposal import propose
 from workbench.limits import MOST_FREEDOMS
 from workbench.reference import MujocoReference
 from workbench.reference.power import PLAIN, power_balance
+from workbench.reference.power_terms import terms_of
 from workbench.reference.survey import INDEPENDENT, _Rest
 
 AGREE = 1e-9
@@ -70,6 +72,20 @@ def test_a_large_machine_reaches_no_more_than_rounding(tmp_path: Path) -> None:
     balance = power_balance(reference, q, qd, qdd, external_force=FORCE)
     assert balance.relative > PLAIN
     assert balance.relative < balance.rounding < 100 * balance.relative
+
+
+def test_summands_of_a_balance_are_counted_by_their_sizes() -> None:
+    """A weight on a spring and a damper, by hand; of a state in which the summands cancel."""
+    mass, height, rate, pull, stiffness, damping, gravity = 2.0, -0.3, 4.0, -5.0, 70.0, 6.0, 9.81
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option gravity="0 0 -{gravity}"/><worldbody><body><joint type="slide" axis="0 0 1"'
+        f' stiffness="{stiffness}" damping="{damping}"/><geom size=".1" mass="{mass}"/></body></worldbody></mujoco>'
+    )
+    terms = terms_of(model, np.array([[height]]), np.array([[rate]]), np.array([[pull]]))
+    weight, spring = mass * gravity, stiffness * abs(height)
+    assert terms.energy[0] == pytest.approx(weight * abs(height) + mass * rate**2 / 2 + spring * abs(height), rel=1e-12)
+    passive = abs(stiffness * -height - damping * rate)
+    assert terms.power[0] == pytest.approx(rate * (mass * abs(pull) + weight + passive), rel=1e-12)
 
 
 def loose(joints: int) -> str:

@@ -11,7 +11,7 @@ from slider_crank import ROBOT, write_slider
 from small_campaign import Workbench
 from workbench.errors import SpecError
 from workbench.robots.catalogue import robot_beside
-from workbench.robots.places import _product
+from workbench.robots.places import ELEMENT_OF, KINDS, _product, parse_place
 
 MISTAKES = {
     "unknown key": ("actuated =", "actuatd =", ("actuatd: unknown key", 'did you mean "actuated"')),
@@ -90,6 +90,20 @@ def test_the_file_itself_is_right(workbench: Workbench) -> None:
 )  # fmt: skip
 def test_signs_and_factors_of_a_place(text: str, factor: float, names: tuple[str, ...]) -> None:
     assert _product(text, "here") == (factor, names)
+
+
+@pytest.mark.parametrize("kind", ELEMENT_OF)
+def test_a_place_names_what_its_form_says(kind: str) -> None:
+    names = [f"n{i}" for i in range(len(KINDS[kind].elements))]
+    axes = ["x", "y", "z"] if KINDS[kind].form.endswith("x|y|z") else [""]
+    for index, axis in enumerate(axes):
+        place = parse_place(" ".join([kind, *names, axis]), "p", "here")
+        assert (place.element, place.attribute) == ELEMENT_OF[kind]
+        assert (place.name, place.index, place.factor, place.of) == ("\n".join(names), index, 1.0, ("p",))
+    for wrong in ([*names, "one more", axes[0]], [*names, *(["w"] if axes[0] else ["x"])], names[1:] + axes[:1]):
+        if names or len(wrong) > 1:
+            with pytest.raises(SpecError, match=r"^here .*allowed: "):
+                parse_place(" ".join([kind, *(f'"{word}"' for word in wrong if word)]), "p", "here")
 
 
 def test_a_robot_file_beside_a_model_speaks_for_that_model_alone(tmp_path: Path) -> None:

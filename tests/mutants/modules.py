@@ -120,13 +120,25 @@ UNCOMPILED_TESTS: dict[str, tuple[str, ...]] = {
 """The same for the reference's kernels, which are left uncompiled."""
 
 LONGER_TESTS: dict[str, tuple[str, ...]] = {
+    "campaign/": (
+        "user_kinematics", "own_campaign", "case_figures", "negative_controls", "recorded", "errata", "campaign_run",
+        "second_engine_campaigns", "campaign_spec", "statements",
+    ),
+    "mjcf/": ("mjcf_assumptions", "robot_file", "importing", "urdf", "engine_warnings", "variants", "own_campaign"),
+    "robots/": (
+        "model_command", "models", "variants", "agreement", "actuators", "mass_models", "robot_folder", "statements",
+        "fuzz_mechanisms", "own_campaign", "library_formulas",
+    ),
     "reference/forward": ("control_plant", "control_routes"),
     "reference/pinocchio": (),
     "reference/platform_": ("task_coordinates", "platform_side"),
     "reference/stiff_plant": ("control_routes", "control_plant"),
     "reference/survey": (),
     "reference/task": ("seen_from_the_base", "task_coordinates", "platform_side"),
-    "reference/": ("compiled_closure", "reference_closure", "motion_along", "reference_linear", "counted_forces"),
+    "reference/": (
+        "compiled_closure", "reference_closure", "motion_along", "reference_linear", "counted_forces", "tolerances",
+        "large_machines", "reference_evidence",
+    ),
 }  # fmt: skip
 """Test files that what survives a short run has to survive as well, compiled and however long a test takes."""
 
@@ -138,7 +150,7 @@ def short_tests(module: str) -> list[str]:
 
 
 def longer_tests(module: str) -> list[str]:
-    """Test files for what survives those of a short run; none but for the reference."""
+    """Test files for what survives those of a short run."""
     for start, tests in LONGER_TESTS.items():
         if module.startswith(start):
             return list(dict.fromkeys([*map(test_file, tests), *short_tests(module)]))
