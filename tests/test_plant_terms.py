@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
+from made_machines import custom
 from nullspace_oracle import NullSpaceOracle
 from platform_robots import three_rps
 from random_mechanisms import draw
@@ -23,12 +25,18 @@ from workbench.reference.forward_kernels import Masses
 AGREE = 1e-9
 SEEDS = (15, 57, 86)
 """Random mechanisms with springs, armatures, gravity taken off a body, welds, and rods on ball joints."""
+IN_THE_FILE = "six legs, said in the file"
+"""A campaign that says what drives a robot has free joints taken apart; a file that says so itself keeps them."""
 
 
 def machine(name: str) -> tuple[str, tuple[str, ...], str]:
     """Text, actuated joints, site."""
     if name == "six legs":
         return stewart("<freejoint/>"), tuple(f"l{k}" for k in range(6)), "plate"
+    if name == IN_THE_FILE:
+        text, actuated, site = machine("six legs")
+        motors = "".join(f'<motor joint="{joint}"/>' for joint in actuated)
+        return text.replace("</mujoco>", f"{custom(site)}<actuator>{motors}</actuator></mujoco>"), actuated, site
     if name == "three legs":
         return three_rps(), ("q1", "q2", "q3"), "centre"
     drawn = draw(int(name))
@@ -36,13 +44,16 @@ def machine(name: str) -> tuple[str, tuple[str, ...], str]:
     return drawn.text, tuple(drawn.actuated), "platform"
 
 
-@pytest.mark.parametrize("name", ["six legs", "three legs", *map(str, SEEDS)])
+@pytest.mark.parametrize("name", ["six legs", IN_THE_FILE, "three legs", *map(str, SEEDS)])
 def test_mass_and_bias_are_those_of_the_null_space(tmp_path: Path, name: str) -> None:
     text, actuated, site = machine(name)
     path = tmp_path / "model.xml"
     path.write_text(text)
     force = np.array([5.0, -3.0, 9.0])
-    plant = Plant(MujocoReference(path, setup=Setup(actuated, site)), force)
+    setup = Setup(actuated, site) if name != IN_THE_FILE else None
+    plant = Plant(MujocoReference(path, setup=setup), force)
+    free = mujoco.mjtJoint.mjJNT_FREE in plant.reference.compiled().jnt_type
+    assert free == (setup is None)
     oracle = NullSpaceOracle(text, list(actuated), spins_of(name))
     rng = np.random.default_rng(3)
     q = plant.reference.home + 0.02 * rng.uniform(-1, 1, len(actuated))
