@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,7 +17,7 @@ from workbench.campaign.kinematics import KinematicsChecks, KinematicsRow, _row,
 from workbench.campaign.platform import _apart
 from workbench.campaign.torques import torques_of
 from workbench.campaign.unloaded import UNLOADED, joint_error, largest_reaction, normaliser_of
-from workbench.campaign.user_candidates import SLOW_S, UserCandidate
+from workbench.campaign.user_candidates import SLOW_S, UserCandidate, load_candidates
 from workbench.errors import ArrayError, CandidateError, SpecError
 
 REACTION = 200.0
@@ -316,6 +317,22 @@ def test_a_second_engine_is_asked_where_it_has_one_answer(
 def test_one_sample_is_nothing_to_drive_along() -> None:
     case: Any = SimpleNamespace(motion=SimpleNamespace(t=np.zeros(1)), robot=None, force=np.zeros((1, 3)))
     assert evidence_module._replays(case, None, []) is None  # type: ignore[arg-type]
+
+
+def test_a_formula_of_the_time_is_not_driven_along(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The simulation's own states have no time of the motion."""
+    formula = '@workbench.candidate("{0}", reference="lumped")\ndef {0}(p, q, qd, qdd{1}):\n    return q\n'
+    file = tmp_path / "f.py"
+    file.write_text("import workbench\n" + formula.format("plain", "") + formula.format("timed", ", t"))
+    candidates: Any = {one.name: SimpleNamespace(function=one) for one in load_candidates([file])}
+    assert sorted(candidates) == ["plain", "timed"]
+    monkeypatch.setattr(evidence_module, "course_of", lambda case: None)
+    monkeypatch.setattr(evidence_module, "replay", lambda reference, course, torques, *_: list(torques))
+    robot = SimpleNamespace(candidates=candidates)
+    case: Any = SimpleNamespace(
+        motion=SimpleNamespace(t=np.arange(2.0)), robot=robot, force=np.zeros((2, 3)), spec=SimpleNamespace(replay=None)
+    )
+    assert evidence_module._replays(case, None, list(candidates)) == ["plain"]  # type: ignore[arg-type,comparison-overlap]
 
 
 def test_hints_are_of_what_fails_and_has_a_familiar_shape(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ import pytest
 from small_campaign import CANDIDATES, CASE, HEAD, Workbench
 from workbench.campaign.bounded_call import UnrulyError, bounded, said
 from workbench.campaign.user_candidates import load_candidates
+from workbench.control.user_controller import load_controllers
 from workbench.errors import OutputError, SpecError
 from workbench.robots.edit import edit_file
 
@@ -162,3 +163,27 @@ def test_protected_and_linked_models_are_not_overwritten(tmp_path: Path, reposit
     edit_file(model, ["a2=0.31"], in_place=True)
     assert model.read_bytes() != before
     assert stat.S_IMODE(model.stat().st_mode) == 0o640
+
+
+def test_a_function_that_decorators_wrap_is_not_lost(tmp_path: Path) -> None:
+    file = tmp_path / "f.py"
+    file.write_text(
+        "import functools, workbench\n\ndef plainly(function):\n    @functools.wraps(function)\n"
+        "    def call(*given):\n        return function(*given)\n    return call\n\n"
+        '@plainly\n@workbench.candidate("inside")\ndef f(p, q, qd, qdd):\n    return q\n\n'
+        '@workbench.candidate("outside")\n@plainly\ndef g(p, q, qd, qdd):\n    return q\n'
+    )
+    assert [one.name for one in load_candidates([file])] == ["inside", "outside"]
+    file.write_text(file.read_text().replace("    @functools.wraps(function)\n", ""))
+    with pytest.raises(SpecError, match=r'f\.py:8: candidate "inside" is registered and lost: its function f '):
+        load_candidates([file])
+
+
+def test_two_controllers_of_one_function_name_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "c.py"
+    text = 'import workbench\n@workbench.controller("{0}")\ndef law(p, sample):\n    return sample.q\n'
+    file.write_text(text.format("one"))
+    assert [one.name for one in load_controllers([file])] == ["one"]
+    file.write_text(text.format("one") + text.format("two"))
+    with pytest.raises(SpecError, match=r'c\.py:2: controller "one" is registered and lost: its function law '):
+        load_controllers([file])

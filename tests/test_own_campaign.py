@@ -193,6 +193,17 @@ COMPLAINTS = {
         "@workbench.candidate('a')\ndef g(p, q, qd, qdd): ...\n",
         'candidate "a" is registered twice',
     ),
+    "the same function twice": (
+        "bad.py",
+        "import workbench\n@workbench.candidate('a')\ndef f(p, q, qd, qdd): ...\n"
+        "@workbench.candidate('b')\ndef f(p, q, qd, qdd): ...\n",
+        'bad.py:2: candidate "a" is registered and lost: its function f is defined again',
+    ),
+    "inside another function": (
+        "bad.py",
+        "import workbench\ndef make():\n    @workbench.forward_kinematics\n    def f(p, q): ...\nmake()\n",
+        'bad.py:3: candidate "f" is registered and lost',
+    ),
     "bound": (
         "bad.py",
         "import workbench\n@workbench.candidate('a', bound=-1)\ndef f(p, q, qd, qdd): ...\n",

@@ -30,6 +30,7 @@ from workbench.campaign.spec import Campaign
 from workbench.capabilities.robot import Robot
 from workbench.errors import CandidateError, SpecError, did_you_mean
 from workbench.robots.closed_form import Candidate
+from workbench.robots.registered import refuse_lost
 from workbench.robots.registration import FORWARD, MARK, TORQUE, Registration
 from workbench.schema import NAME, NAME_RULE
 
@@ -273,6 +274,7 @@ def load_candidates(names: Iterable[Formula]) -> tuple[UserCandidate, ...]:
             found.append(load_foreign(Path(name)))
             continue
         module, siblings = load_module(str(name), LOADING_LIMIT_S)
+        refuse_lost(module, "candidate", str(name))
         registered = [
             UserCandidate(value, mark, str(name), siblings)
             for value, mark in ((value, _mark(value)) for value in list(vars(module).values()))

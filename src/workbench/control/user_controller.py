@@ -29,6 +29,7 @@ from workbench.campaign.formula_files import Siblings, files_of, load_module
 from workbench.control.controllers import Gains, Law, Model
 from workbench.control.sampling import Desired
 from workbench.errors import CandidateError, SpecError
+from workbench.robots.registered import note, refuse_lost
 
 MARK = "__workbench_controller__"
 LOADING_LIMIT_S = 60.0
@@ -66,6 +67,7 @@ def controller(name: str | None = None) -> Callable[[Callable[..., Any]], Callab
 
     def mark(function: Callable[..., Any]) -> Callable[..., Any]:
         setattr(function, MARK, name or function.__name__)
+        note(function, name or function.__name__)
         return function
 
     return mark
@@ -153,6 +155,7 @@ def load_controllers(names: Iterable[str | Path]) -> tuple[UserController, ...]:
     found: list[UserController] = []
     for name in names:
         module, siblings = load_module(str(name), LOADING_LIMIT_S)
+        refuse_lost(module, "controller", str(name))
         marked = {}
         for value in vars(module).values():
             mark = getattr(value, MARK, None) if inspect.isfunction(value) else None

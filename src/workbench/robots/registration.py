@@ -13,6 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar, overload
 
+from workbench.robots.registered import note
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 MARK = "__workbench_candidate__"
@@ -95,6 +97,7 @@ def candidate(
         text = description or (function.__doc__ or "").strip().partition("\n")[0]
         mark = Registration(function.__name__ if name is None else name, reference, bound, text, source)
         setattr(function, MARK, mark)
+        note(function, mark.name)
         return function
 
     return register
@@ -136,6 +139,7 @@ def _kinematics(kind: str, name: Any, bound: float, description: str) -> Any:
         text = description or (function.__doc__ or "").strip().partition("\n")[0]
         mark = Registration(function.__name__ if name is None else name, "distributed", bound, text, kind=kind)
         setattr(function, MARK, mark)
+        note(function, mark.name)
         return function
 
     return register
