@@ -51,9 +51,9 @@ def test_inertia_in_the_axes_of_the_body(quaternion: list[float]) -> None:
         ("size", 0, True),
         ("size", 1, True),
         ("size", 2, False),
-        ("size", WHOLE, True),
+        pytest.param("size", WHOLE, True, id="size as a whole"),
         ("fromto", 0, False),
-        ("fromto", WHOLE, False),
+        pytest.param("fromto", WHOLE, False, id="fromto as a whole"),
     ],
 )
 def test_a_number_is_written_where_the_file_has_so_many(attribute: str, index: int, written: bool) -> None:

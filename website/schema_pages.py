@@ -158,7 +158,7 @@ def _limits(metadata: Sequence[Any]) -> str:
 def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "**required**"
-    value = field.get_default(call_default_factory=True)
+    value = field.default if field.default_factory is None else field.default_factory()  # type: ignore[call-arg]
     if value is None:
         return ""
     if isinstance(value, BaseModel):

@@ -62,6 +62,8 @@ def read_columns(
         with pq.ParquetFile(pa.BufferReader(read_bytes(path, largest)), page_checksum_verification=True) as file:
             chosen = _judged(path, file, names, texts, indices, rows)
             table = file.read(columns=chosen, use_threads=False)
+            if table.num_rows != file.metadata.num_rows:  # of its parts' counts, which no checksum covers
+                raise ValueError(f"{table.num_rows} rows in its parts, {file.metadata.num_rows} in all")
     except FileNotFoundError:
         raise
     except (OSError, ValueError, pa.ArrowException) as error:
