@@ -185,6 +185,16 @@ def test_numbers_that_keep_their_value_keep_their_digits(tmp_path: Path) -> None
     assert source.read_text().count('pos="0.000 0 0.3000"') == 2
 
 
+@pytest.mark.parametrize(
+    ("token", "after"),
+    [("0.4500", "0.4500"), ("4.5e-1", "4.5e-1"), ("0.45000000000000001110223", "0.45"), ("0.46", "0.45")],
+)
+def test_a_number_that_is_there_keeps_its_spelling_unless_it_says_more_than_a_double(token: str, after: str) -> None:
+    text = '<mujoco><worldbody><body name="b"><inertial pos="0 0 0" mass="{0}"/></body></worldbody></mujoco>'
+    edits = [Edit("inertial", "b", "mass", 0, 0.45)]
+    assert replace_numbers(text.format(token), "m.xml", edits) == text.format(after)
+
+
 def test_spelling_of_tags_does_not_matter(tmp_path: Path) -> None:
     """Single quotes, attributes over several lines, a joint of the same name in another section."""
     source = tmp_path / "in.xml"

@@ -14,7 +14,7 @@ import pytest
 
 from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, WorkbenchError
-from workbench.mjcf.files import MAX_BYTES
+from workbench.mjcf.files import MAX_BYTES, UnreadableError, read_bytes
 from workbench.mjcf.safety import MAX_DEPTH, MAX_ELEMENTS, _memory, refuse_element
 from workbench.reference.check import check_model
 from workbench.robots.edit import edit_file
@@ -73,6 +73,7 @@ HOSTILE: dict[str, tuple[str, str]] = {
     "memory bomb in bytes": (TEXT.replace("<option", '<size memory="99999999999"/><option', 1), "at most 1G"),
     "user data bomb": (TEXT.replace("<option", '<size nuserdata="2000000000"/><option', 1), "at most 1000000"),
     "user numbers bomb": (TEXT.replace("<option", '<size nuser_body="100000000"/><option', 1), "at most 1000"),
+    "picture of too many samples": (TEXT.replace("<option", '<visual><quality offsamples="65"/></visual><option', 1), "at most 64"),
     "NaN": (TEXT.replace('name="rod_left_tip" pos="0 0 0.3"', 'name="rod_left_tip" pos="nan 0 0.3"'), "is not finite"),
     "infinity": (TEXT.replace('mass="0.45"', 'mass="inf"'), "is not finite"),
     "minus Infinity": (TEXT.replace('gravity="0 0 -9.81"', 'gravity="0 0 -Infinity"'), "is not finite"),
@@ -226,6 +227,11 @@ def test_what_is_no_model_file_is_one_line(name: str, tmp_path: Path, untouched:
         assert "root:" not in str(caught.value)
     assert perf_counter() - start < QUICK
     assert list(untouched.iterdir()) == []
+
+
+def test_a_file_that_the_system_does_not_open_says_why(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableError, match=r"^No such file or directory$"):
+        read_bytes(tmp_path / "absent.stl", 100)
 
 
 @pytest.mark.parametrize("name", ["a\0b.xml", "x" * 5000, "", ".", "/", "model.xml/more.xml", "\ud800.xml"])

@@ -106,6 +106,26 @@ def test_damping_and_limits_are_kept(tmp_path: Path) -> None:
     assert any("effort and speed of 2 joints" in line for line in found.lost)
 
 
+@pytest.mark.parametrize(("kept", "said"), [("effort", True), ("velocity", True), ("", False)])
+def test_a_limit_of_effort_or_speed_that_is_lost_is_said(kept: str, said: bool) -> None:
+    left = {"effort": "100", "velocity": "10"}
+    limit = LIMIT
+    for name, value in left.items():
+        if name != kept:
+            limit = limit.replace(f' {name}="{value}"', "")
+    found = import_urdf(FOURBAR.replace(LIMIT, limit), "robot.urdf", LoopTable())
+    assert any("effort and speed of 1 joints" in line for line in found.lost) == said
+
+
+def test_a_frame_may_be_named_by_its_joint() -> None:
+    free = ("rx", "ry", "rz")
+    by_link, by_joint = (
+        import_urdf(FOURBAR, "robot.urdf", LoopTable((Loop(*names, free),), ("q",))).text
+        for names in (("tip", "ground"), ("tip_frame", "ground_frame"))
+    )
+    assert by_joint == by_link
+
+
 def test_a_mimic_becomes_a_joint_equality() -> None:
     more = '<mimic joint="q" multiplier="-0.5" offset="0.1"/>'
     urdf = FOURBAR.replace(
@@ -126,6 +146,13 @@ def test_links_without_mass_go_into_the_link_behind_them() -> None:
     model = mujoco.MjModel.from_xml_string(found.text)
     assert [model.joint(j).name for j in range(model.njnt)] == ["q", "one", "elbow", "hang"]
     assert model.body("coupler").jntnum[0] == 2
+    # what is welded on gives it a mass, and a body of its own
+    heavy = cross + link("plate", 0.1) + joint("weld", "fixed", "cross", "plate", "0 0 0")
+    other = mujoco.MjModel.from_xml_string(
+        import_urdf(FOURBAR.replace(elbow, heavy + two), "robot.urdf", LoopTable()).text
+    )
+    assert (other.body("cross").jntnum[0], other.body("coupler").jntnum[0]) == (1, 1)
+    assert other.body_subtreemass[0] == pytest.approx(model.body_subtreemass[0] + 0.1)
     with pytest.raises(ModelError, match='link "cross" moves and has no mass'):
         import_urdf(FOURBAR.replace(elbow, cross + two), "robot.urdf", LoopTable((Loop("cross", "ground", ()),), ()))
 
