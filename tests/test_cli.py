@@ -109,11 +109,11 @@ def test_ctrl_c_leaves_the_earlier_run_and_nothing_else(workbench: Workbench) ->
     [
         (["run"], "which CAMPAIGN? A TOML file, or one that comes along: almeida_2010"),
         (["run", "a.toml", "b.toml"], "(b.toml)"),
-        (["run", "small.toml", "--bogus"], "No such option: --bogus"),
+        (["run", "small.toml", "--bogus"], "--bogus"),
         (["run", "small.toml", "--out"], "Option '--out' requires an argument."),
         (["run", "a\0b.toml"], "null byte"),
         (["rum"], "No such command 'rum'."),
-        (["--bogus"], "No such option: --bogus"),
+        (["--bogus"], "--bogus"),
     ],
     ids=lambda value: " ".join(value).replace("\0", "0") if isinstance(value, list) else "",
 )

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from exact_csv import read_exact
 from own_mechanisms import CAMPAIGN, FOURBAR
 from small_campaign import Workbench, listing
 
@@ -90,7 +91,7 @@ def test_any_number_of_workers_gives_the_same_bytes(workbench: Workbench) -> Non
     case = str(errors["case"].iloc[0])
     alone = workbench("run", "sweep.toml", "--candidates", "mine.py", "--only", case, "--out", "alone", "--quick")
     assert alone.code == 4, alone
-    rows = pd.read_csv(workbench.directory / "alone" / "summary.csv")
+    rows = read_exact(workbench.directory / "alone" / "summary.csv")
     expected = errors[errors["case"] == case]
     assert rows["peak_error"].tolist() == expected["peak_error"].tolist()
 

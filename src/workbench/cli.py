@@ -135,6 +135,9 @@ def _notice(text: str) -> None:
 
 
 def _run(arguments: list[str], asked: Sequence[int] = ()) -> int:
+    for argument in arguments:
+        if "\0" in argument:  # no system hands one over; what calls this from Python may
+            return _complain(f"{argument!r}: a null byte in an argument", BAD_INPUT)
     try:
         code = app(args=arguments, prog_name="workbench", standalone_mode=False)
     except (WorkbenchError, USAGE_ERROR) as error:

@@ -24,12 +24,13 @@ if os.environ.get(WITHOUT_COMPILER, "0") != "0":
 
 with shielded():
     from numba import config, float64, njit, types
+    from numba.core.errors import NumbaError
 
 # numba looks for this file of the current directory again before it compiles
 if hasattr(config, "_config_fname"):
     config._config_fname = str(Path(__file__).parent / "no_numba_config")
 
-__all__ = ["borrowing", "compiled", "float64", "inlined", "types"]
+__all__ = ["NumbaError", "borrowing", "compiled", "float64", "inlined", "types"]
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 """IEEE arithmetic throughout, no fast-math: NaN stays NaN, and a sample's result does not depend on whether it was

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from workbench.arrays import FloatArray, as_batch, as_batches
-from workbench.compiled import float64, types
+from workbench.compiled import NumbaError, float64, types
 from workbench.errors import ParameterError
 from workbench.robots.blocks import BLOCK
 
@@ -147,8 +147,8 @@ def one_sample(kernel: Any, constants: FloatArray, refuse: Refusal, friction: Fr
         state = None if friction is None else (_row(q), _row(qd), _row(qdd))
         try:
             done = kernel(constants, q, qd, qdd, force, tau)
-        except TypeError:
-            # lists, other number types, strided views
+        except (TypeError, NumbaError):
+            # lists, other number types (of which older numba knows not all by name), strided views
             given = as_batches(q=[q], qd=[qd], qdd=[qdd], external_force=[force])
             found = np.empty(3)
             done = kernel(constants, *(array[0] for array in given), found)
