@@ -16,6 +16,7 @@ import pytest
 import workbench as wb
 from workbench.errors import ArrayError, MotionError
 from workbench.reference import alike, power, replay
+from workbench.reference import displaced as displaced_module
 from workbench.reference.power import power_balance
 from workbench.reference.raw_inverse import raw_mj_inverse
 
@@ -180,6 +181,22 @@ def test_steps_are_shortened_at_the_edge_of_the_workspace(planar: wb.MujocoRefer
     with pytest.raises(MotionError):
         power._difference(displaced, np.array([0]), "distributed", power.FIRST_STEP * scale)
     assert power_balance(planar, q, qd, qdd).relative < 1e-6
+
+
+def test_energy_is_that_of_the_reference_and_of_no_singular_pose(
+    asym: wb.MujocoReference, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion, some, step = at(SIMULATION_2)(np.linspace(0.1, 1.0, 40)), np.array([3, 4, 30]), 1e-3
+    displaced = power.displaced_samples(asym, asym.inverse_dynamics(*motion).qpos, *motion)
+    moved, speed = displaced.moved(some, step)
+    for mass_model in ("distributed", "lumped"):
+        whole = asym.inverse_dynamics(moved, speed, 0 * moved, mass_model, near=displaced.closed(some, step))
+        assert np.array_equal(displaced.energy(some, step, mass_model), whole.energy.sum(axis=1))
+    poses = displaced.closed(some, step)
+    poses.rank[7] -= 1
+    monkeypatch.setattr(displaced_module.Displaced, "closed", lambda *_: poses)
+    with pytest.raises(MotionError, match="singular"):
+        displaced.energy(some, step, "lumped")
 
 
 def test_what_is_known_and_shared_changes_no_bit_of_a_balance(asym: wb.MujocoReference) -> None:

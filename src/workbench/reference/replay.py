@@ -259,9 +259,10 @@ class _Runner:
         """Joint coordinates less those of the motion, ``(k, steps / every, na)``, under torques ``(k, steps, na)``."""
         structure, count, step = self._reference.structure, len(tau), window / steps
         model = near_rigid(self._reference.spec(), step, self._pull())
-        lost: np.ndarray = ~np.isfinite(tau).all(axis=(1, 2))
         applied = np.zeros((count, steps, model.nv))
-        applied[:, :, structure.actuated] = np.where(lost[:, None, None], 0.0, tau)
+        applied[:, :, structure.actuated] = tau
+        lost = ~np.isfinite(tau).all(axis=(1, 2))
+        applied[lost] = 0.0
         batch = Batch(model, count, min(count, self._reference.threads))
         batch.qpos = np.repeat(self._initial.qpos, count, axis=0)
         batch.qvel = np.repeat(self._initial.qvel, count, axis=0)
