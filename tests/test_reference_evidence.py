@@ -15,7 +15,8 @@ import pytest
 
 import workbench as wb
 from workbench.errors import ArrayError, MotionError
-from workbench.reference import power, replay
+from workbench.reference import alike, power, replay
+from workbench.reference import displaced as displaced_module
 from workbench.reference.power import power_balance
 from workbench.reference.raw_inverse import raw_mj_inverse
 
@@ -182,6 +183,22 @@ def test_steps_are_shortened_at_the_edge_of_the_workspace(planar: wb.MujocoRefer
     assert power_balance(planar, q, qd, qdd).relative < 1e-6
 
 
+def test_energy_is_that_of_the_reference_and_of_no_singular_pose(
+    asym: wb.MujocoReference, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion, some, step = at(SIMULATION_2)(np.linspace(0.1, 1.0, 40)), np.array([3, 4, 30]), 1e-3
+    displaced = power.displaced_samples(asym, asym.inverse_dynamics(*motion).qpos, *motion)
+    moved, speed = displaced.moved(some, step)
+    for mass_model in ("distributed", "lumped"):
+        whole = asym.inverse_dynamics(moved, speed, 0 * moved, mass_model, near=displaced.closed(some, step))
+        assert np.array_equal(displaced.energy(some, step, mass_model), whole.energy.sum(axis=1))
+    poses = displaced.closed(some, step)
+    poses.rank[7] -= 1
+    monkeypatch.setattr(displaced_module.Displaced, "closed", lambda *_: poses)
+    with pytest.raises(MotionError, match="singular"):
+        displaced.energy(some, step, "lumped")
+
+
 def test_what_is_known_and_shared_changes_no_bit_of_a_balance(asym: wb.MujocoReference) -> None:
     t = np.linspace(0.1, 1.0, 260)  # of more samples than are looked at, each mass model has its own peaks
     motion = at(SIMULATION_2)(t)
@@ -202,7 +219,7 @@ def test_what_is_known_and_shared_changes_no_bit_of_a_balance(asym: wb.MujocoRef
     other.closed(some[1:3], 1e-3)
     whole, fresh = other.closed(some, 1e-3), power.displaced_samples(asym, results["lumped"].qpos, *motion)
     for one, two in zip(whole.arrays, fresh.closed(some, 1e-3).arrays, strict=True):
-        assert np.array_equal(one, two)
+        assert np.array_equal(one, two, equal_nan=True)
 
 
 # forward replay
@@ -234,6 +251,43 @@ def test_replay_of_simulation_2(asym: wb.MujocoReference, closed_form: wb.Robot)
     assert lumped.text == "stalls at 0.26 rad on q2"
     assert found.replays[replay.REFERENCE].verdict == "converges"
     assert found.replays["off"].verdict == "stalls"
+
+
+def test_the_same_torques_are_simulated_once(
+    asym: wb.MujocoReference, closed_form: wb.Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torques = torques_of(closed_form, again=1.0, off=1.0 + 1e-11)
+    # apart at the finest step alone, and on one joint
+    torques["late"] = lambda q, qd, qdd: closed_form.inverse_dynamics(q, qd, qdd) * [
+        1.0, 1.0, 1.0 + 1e-11 * (len(q) == replay.HALVINGS[-1] * replay.COARSE_STEPS)
+    ]  # fmt: skip
+    torques["lumped again"] = torques["lumped"]
+    shared = replay.replay(asym, at(SIMULATION_2), torques, 0.0, 1.0).replays
+    assert {name: one.same_as for name, one in shared.items()} == {
+        "reference": "", "distributed": "reference", "lumped": "", "again": "reference", "off": "", "late": "",
+        "lumped again": "lumped",
+    }  # fmt: skip
+    assert np.array_equal(shared["again"].peak_error, shared["reference"].peak_error)
+    # each by itself: not a digit of what a table shows is another
+    monkeypatch.setattr(alike, "SAME", -1.0)
+    alone = replay.replay(asym, at(SIMULATION_2), torques, 0.0, 1.0).replays
+    for name, one in alone.items():
+        assert one.same_as == ""
+        assert (one.text, one.verdict) == (shared[name].text, shared[name].verdict)
+        np.testing.assert_allclose(one.peak_error, shared[name].peak_error, rtol=1e-7)
+        np.testing.assert_allclose(one.limit, shared[name].limit, atol=1e-7 * one.peak_error.max())
+    assert not np.array_equal(alone["distributed"].peak_error, alone["reference"].peak_error)
+
+
+def test_what_is_alike_is_so_on_each_joint_at_each_step_size() -> None:
+    one = np.array([[1e3, 1e-3], [-2e3, 2e-3]])
+    small, nothing, dead = one.copy(), one.copy(), 0.0 * one
+    small[0, 1] += 1e-14  # rounding of the large joint, not of this one
+    nothing[0, 0] = np.nan
+    assert alike.first_alike([np.stack([one, one * (1 + 3e-16), small, nothing, nothing, dead, dead])]) == [
+        0, 0, 2, 3, 4, 5, 5,
+    ]  # fmt: skip
+    assert alike.first_alike([np.stack([one, one]), np.stack([one, small])]) == [0, 1]
 
 
 def test_replay_of_the_planar_robot_under_force(planar: wb.MujocoReference, repository: Path) -> None:

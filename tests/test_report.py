@@ -58,7 +58,7 @@ EVIDENCE = {
             name: {
                 "steps_s": [0.001, 0.0005, 0.00025], "peak_error": [[1e-4, e, 1e-4] for e in errors],
                 "final_error": [[0.0] * 3] * 3, "order": order, "worst_joint": "q2", "limit": errors[-1],
-                "verdict": verdict, "text": f"{verdict} in words",
+                "verdict": verdict, "text": f"{verdict} in words", "same_as": "lumped" if name == "distributed" else "",
             }
             for name, (verdict, order, errors) in REPLAYS.items()
         },
@@ -494,6 +494,9 @@ def test_the_budget_shows_what_the_reference_is_worth(run: Path) -> None:
     assert replays[0][4:7] == ["1 ms", "0.5 ms", "0.25 ms"]
     assert [row[1] for row in replays[1:]] == ["✓ converges", "→ stalls", "? undecided"]
     assert replays[2][3:8] == ["q2 [rad]", "0.274", "0.262", "0.255", "0.255"]
+    assert [row[8] for row in replays[2:]] == [
+        "stalls in words", "undecided in words; simulated with lumped: the same torques",
+    ]  # fmt: skip
     whole = {row[0]: row[1:3] for row in tables["budget"][1:]}
     assert whole["Power balance"] == ["1.25e-13 of peak power", "sim1"]
     assert whole["Second engine"] == ["3.50e-14 of peak torque", "sim1"]

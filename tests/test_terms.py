@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
 import workbench as wb
 from own_mechanisms import FOURBAR, PARALLELOGRAM
 from test_counted_forces import FEATURES, SETUP, motion, with_feature
+from test_plant_terms import machine
 from workbench.campaign.cases import base_robot
 from workbench.campaign.spec import load_campaign
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
+from workbench.reference.body_motion import body_motion
 from workbench.reference.regressor import NUMBERS, inertial_numbers, inertial_regressor
 from workbench.reference.terms import ACCELERATION, PARTS, VELOCITY, WEIGHT, torque_terms
 from workbench.reference.varied_model import places_of, settable, varied_reference
@@ -54,6 +57,38 @@ def robot(request: pytest.FixtureRequest, repository: Path) -> Robot:
 
 def off(found: np.ndarray, wanted: np.ndarray) -> float:
     return float(np.abs(found - wanted).max() / np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("centres", [True, False])
+@pytest.mark.parametrize("name", ["six legs", "15", "57"])
+def test_bodies_move_as_the_jacobians_of_mujoco_say(tmp_path: Path, name: str, centres: bool) -> None:
+    """On free, ball, hinge and slide joints, in trees that begin at several bodies of the world."""
+    text, actuated, site = machine(name)
+    (tmp_path / "model.xml").write_text(text)
+    reference = MujocoReference(tmp_path / "model.xml", setup=Setup(actuated, site))
+    rng = np.random.default_rng(4)
+    q = reference.home + 0.02 * rng.uniform(-1, 1, (3, len(actuated)))
+    qd, qdd = rng.uniform(-1, 1, (2, *q.shape))
+    moving = body_motion(reference, q, qd, qdd, centres=centres)
+    model, tangent = reference.compiled(), moving.tangent
+    data, jac, turn, dot, turn_dot = mujoco.MjData(model), *np.zeros((4, 3, model.nv))
+    for k, (qvel, qacc) in enumerate(zip(moving.result.qvel, moving.result.qacc, strict=True)):
+        data.qpos[:], data.qvel[:] = moving.result.qpos[k], qvel
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        for body in range(1, model.nbody):
+            place, b = (data.xipos if centres else data.xpos)[body], body - 1
+            mujoco.mj_jac(model, data, jac, turn, place, body)
+            mujoco.mj_jacDot(model, data, dot, turn_dot, place, body)
+            driven = tangent[k] @ qdd[k]
+            for found, wanted in (
+                (moving.linear[k, b], jac @ tangent[k]), (moving.angular[k, b], turn @ tangent[k]),
+                (moving.spin[k, b], turn @ qvel), (moving.linear_driven[k, b], jac @ driven),
+                (moving.angular_driven[k, b], turn @ driven),
+                (moving.linear_carried[k, b], jac @ (qacc - driven) + dot @ qvel),
+                (moving.angular_carried[k, b], turn @ (qacc - driven) + turn_dot @ qvel),
+            ):  # fmt: skip
+                assert np.abs(found - wanted).max() < 1e-12 * (1.0 + np.abs(wanted).max())
 
 
 def test_items_add_up_to_the_torque(robot: Robot) -> None:

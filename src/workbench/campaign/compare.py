@@ -129,6 +129,8 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
     if robot.closed_kinematics:  # else the case's platform motion is the reference's own
         _refuse_other_branch(case, platform.task[0])
     sound = [name for name in torques if name not in computed.faults]
+    # before other poses are closed: the reference still holds those of the motion
+    columns, spent = spent_on(case, reference, next(iter(results)), first) if effort.drawing else ({}, {})
     evidence = gather_evidence(case, reference, results, sound, effort)
     felt = {name: largest_reaction(result.reactions.values()) for name, result in results.items()}
     rows = [
@@ -154,7 +156,6 @@ def compute_case(campaign: Campaign, case: Case, effort: Effort = FULL) -> CaseR
         for point, place in drawing.points.items():
             drawn_columns |= {f"point_{point}_{axis}": place[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
         facts["drawing"] = drawing.facts()
-        columns, spent = spent_on(case, reference, next(iter(results)), first)
         drawn_columns |= columns
         if spent:
             facts["spent"] = spent

@@ -238,6 +238,7 @@ def _replay_facts(found: ReplaySet) -> dict[str, Any]:
             "limit": entry.limit,
             "verdict": entry.verdict,
             "text": entry.text,
+            "same_as": entry.same_as,
         }
 
     return {

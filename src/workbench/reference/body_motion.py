@@ -1,6 +1,6 @@
 """How every body moves with the actuated joints: Jacobians per actuated rate, accelerations, axes.
 
-MuJoCo's own Jacobians are folded with W, all velocities per actuated one, so that the loops are in them. What the
+MuJoCo's axes of motion are folded with W, all velocities per actuated one, so that the loops are in them. What the
 terms of the torque and the inertial regressor are made of.
 """
 
@@ -10,15 +10,17 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from mujoco.batch import Batch
 from numpy.typing import ArrayLike
 
 from workbench.arrays import FloatArray
 from workbench.errors import ParameterError
+from workbench.reference.engine import lean
 from workbench.reference.mujoco_reference import MujocoReference
 from workbench.reference.result import ReferenceResult
 
 BLOCK = 512
-"""Samples whose Jacobians are held at a time, some 20 kB each."""
+"""Samples that are evaluated at a time, some 10 kB each."""
 
 
 @dataclass(frozen=True)
@@ -98,40 +100,41 @@ def body_motion(
             " and has no parts by body"
         )
     result = known or reference.inverse_dynamics(q, qd, qdd, mass_model, external_force, along=along)
-    tangent = reference.tangent(np.asarray(q, dtype=np.float64), near=result.qpos)
+    ordered = along is not None  # then the reference holds what it closed last
+    tangent = reference.tangent(np.asarray(q, dtype=np.float64), ordered, None if ordered else result.qpos)
     model = reference.compiled(mass_model)
-    data = mujoco.MjData(model)
     n, na, nb = len(result.tau), tangent.shape[2], model.nbody - 1
     linear, angular = np.zeros((2, n, nb, 3, na))
     spin, carried_l, carried_a = np.zeros((3, n, nb, 3))
     axes = np.zeros((n, nb, 3, 3))
     springs, dampers, fluid = np.zeros((3, n, model.nv))
-    kept = min(n, BLOCK)
-    point_jac, turn_jac, point_dot, turn_dot = np.zeros((4, kept, nb, 3, model.nv))
     # qacc = W qdd + what the loops need at qdd = 0
     carried = result.qacc - np.einsum("nva,na->nv", tangent, np.asarray(qdd, dtype=np.float64))
-    positions, frames = (data.xipos, data.ximat) if centres else (data.xpos, data.xmat)
+    moves, root = reference.structure.moves[1:].astype(np.float64), np.asarray(model.body_rootid)[1:]
+    kept = min(n, BLOCK)
+    batch = Batch(lean(model), kept, 1)
+    names = ("cdof", "cdof_dot", "subtree_com", *(("xipos", "ximat") if centres else ("xpos", "xmat")))
+    cdof, cdof_dot, com, positions, frames = (batch.bind(name) for name in names)
+    forces = [batch.bind(name) for name in ("qfrc_spring", "qfrc_damper", "qfrc_fluid")]
     for first in range(0, n, BLOCK):
         rows = slice(first, min(first + BLOCK, n))
-        for k, sample in enumerate(range(rows.start, rows.stop)):
-            data.qpos[:], data.qvel[:] = result.qpos[sample], result.qvel[sample]
-            mujoco.mj_fwdPosition(model, data)
-            mujoco.mj_fwdVelocity(model, data)
-            springs[sample], dampers[sample], fluid[sample] = data.qfrc_spring, data.qfrc_damper, data.qfrc_fluid
-            axes[sample] = frames[1:].reshape(nb, 3, 3)
-            for body in range(nb):
-                place = positions[body + 1]
-                mujoco.mj_jac(model, data, point_jac[k, body], turn_jac[k, body], place, body + 1)
-                mujoco.mj_jacDot(model, data, point_dot[k, body], turn_dot[k, body], place, body + 1)
-        count = rows.stop - rows.start
-        rates, held = result.qvel[rows, None, :, None], carried[rows, None, :, None]
-        for jac, dot, folded, without in (
-            (point_jac[:count], point_dot[:count], linear, carried_l),
-            (turn_jac[:count], turn_dot[:count], angular, carried_a),
-        ):
-            folded[rows] = jac @ tangent[rows, None]
-            without[rows] = (jac @ held + dot @ rates)[..., 0]
-        spin[rows] = (turn_jac[:count] @ rates)[..., 0]
+        count, rates = rows.stop - rows.start, result.qvel[rows, :, None, None]
+        batch.qpos[:count], batch.qvel[:count] = result.qpos[rows], result.qvel[rows]
+        batch.forward(np.arange(count, dtype=np.int32), stage=mujoco.mjtStage.mjSTAGE_VEL.value)
+        for kind, force in zip((springs, dampers, fluid), forces, strict=True):
+            kind[rows] = force[:count]
+        axes[rows] = frames[:count, 1:].reshape(count, nb, 3, 3)
+        offset = (positions[:count, 1:] - com[:count, root])[..., None]
+        # of each joint, turning and sliding about the mass centre of its tree, times what it does: per actuated rate,
+        # its acceleration at qdd = 0, its rate; and how what it does itself turns, times its rate
+        axis, done = cdof[:count, :, :, None], np.concatenate([tangent[rows], carried[rows, :, None]], axis=2)
+        each = np.concatenate([axis * done[:, :, None], axis * rates, cdof_dot[:count, :, :, None] * rates], axis=3)
+        whole = (moves @ each.reshape(count, model.nv, -1)).reshape(count, nb, 6, na + 3)
+        turned = whole[:, :, :3]
+        at_point = whole[:, :, 3:] + np.cross(turned, offset, axis=2)
+        angular[rows], linear[rows] = turned[..., :na], at_point[..., :na]
+        spin[rows], carried_a[rows] = turned[..., na + 1], turned[..., na] + turned[..., na + 2]
+        carried_l[rows] = at_point[..., na] + at_point[..., na + 2] + np.cross(spin[rows], at_point[..., na + 1])
     qdd = np.asarray(qdd, dtype=np.float64)
     return BodyMotion(
         names=tuple(model.body(body).name or f"#{body}" for body in range(1, model.nbody)),

@@ -127,7 +127,10 @@ class Continuation(ABC):
             self.tolerance = tolerance_of(engine.model, drawn, structure.file)
             self.centres = np.array(drawn.subtree_com)
             """``(nbody, 3)`` mass centres of subtrees as drawn, world"""
-            self.base = drawn.xpos[structure.base].copy(), drawn.xmat[structure.base].reshape(3, 3).copy()
+            self.base: tuple[FloatArray, FloatArray] = (
+                drawn.xpos[structure.base].copy(),
+                drawn.xmat[structure.base].reshape(3, 3).copy(),
+            )
             """position and axes of the base body, which is fixed, world"""
         # a step in metres counts by the robot's size, one in radians as it is
         self._weights = weights_of(engine.model, self.tolerance.size)

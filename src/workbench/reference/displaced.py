@@ -10,7 +10,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from workbench.arrays import FloatArray
+from workbench.errors import MotionError
 from workbench.reference.continuation import Assembly
+from workbench.reference.engine import Evaluator
+from workbench.reference.kernels import velocities
 from workbench.reference.mujoco_reference import MujocoReference
 
 
@@ -74,6 +77,29 @@ class Displaced:
             known, poses = together[order], found.at(self._rows(order))
             self._closed[step] = known, poses
         return poses.at(self._rows(np.searchsorted(known, samples)))
+
+    def energy(self, samples: np.ndarray, step: float, mass_model: str) -> FloatArray:
+        """Kinetic and potential energy ``(m k,)`` of *samples* so moved, J.
+
+        Raises
+        ------
+        MotionError
+            One of them cannot be reached, or the actuators do not determine its velocities.
+        """
+        solver, _ = self.reference.determining
+        closed, (_, speed) = self.closed(samples, step), self.moved(samples, step)
+        if (closed.rank < len(solver.structure.passive)).any():
+            raise MotionError(f"{solver.file}: a displaced sample is in a singular pose")
+        engine = solver.engine(mass_model)
+        qvel, energy = np.zeros((len(speed), engine.model.nv)), np.zeros(len(speed))
+        velocities(closed.tangent, np.ascontiguousarray(speed), qvel)
+
+        def block(evaluator: Evaluator, rows: slice) -> None:
+            _, dynamics = evaluator.move(closed.qpos[rows], qvel[rows])
+            energy[rows] = dynamics.energy[: rows.stop - rows.start].sum(axis=1)
+
+        engine.in_blocks(block, len(speed))
+        return energy
 
     def _rows(self, places: np.ndarray) -> np.ndarray:
         count = len(self.times)

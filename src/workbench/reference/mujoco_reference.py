@@ -87,7 +87,6 @@ class MujocoReference(PlatformSide):
         self._leader: tuple[MujocoReference, np.ndarray] | None = None
         self._closed: tuple[FloatArray, Assembly, bool] | None = None
         self._platform: dict[tuple[str, ...], PlatformCloser] = {}
-        self._base_rotation = np.eye(3)
         self._locate_base()
         self._check_freedoms()
 
@@ -171,7 +170,7 @@ class MujocoReference(PlatformSide):
         ModelError
             The file does not say which bars lose their inertia in the lumped model.
         """
-        return self._engine(mass_model).model
+        return self.engine(mass_model).model
 
     def with_model(self, model: mujoco.MjModel) -> MujocoReference:
         """The same mechanism with other masses: *model* differs from the compiled one in nothing else."""
@@ -250,7 +249,7 @@ class MujocoReference(PlatformSide):
         # for the kernels, arrays that may not be written to are another type
         qd, qdd = np.require(qd, requirements="W"), np.require(qdd, requirements="W")
         force = np.ascontiguousarray(as_force("external_force", external_force, n) @ self._base_rotation.T)
-        engine = self._engine(mass_model)
+        engine = self.engine(mass_model)
         times = None if along is None else as_rows("along", np.reshape(along, (-1, 1)), 1)[:, 0]
         if times is not None:
             same_lengths(q=q, along=times)
@@ -314,7 +313,8 @@ class MujocoReference(PlatformSide):
         }
         return ReferenceResult(**arrays)
 
-    def _engine(self, mass_model: str) -> Engine:
+    def engine(self, mass_model: str) -> Engine:
+        """What evaluates the model under a mass assumption; errors as `compiled`."""
         if mass_model not in MASS_MODELS:
             raise ParameterError(f'unknown mass model "{mass_model}"{did_you_mean(mass_model, MASS_MODELS)}')
         if mass_model not in self._engines:

@@ -13,6 +13,7 @@ the coarsest step.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ from mujoco.batch import Batch
 from workbench.arrays import FloatArray
 from workbench.errors import ArrayError, MotionError
 from workbench.mjcf.engine_warnings import engine_warnings
+from workbench.reference.alike import first_alike
 from workbench.reference.mujoco_reference import MujocoReference
 
 COARSE_STEPS = 1000
@@ -93,6 +95,8 @@ class Replay:
     """``converges``, ``stalls``, ``diverges`` or ``undecided``"""
     text: str
     """the verdict with its figures, for a table"""
+    same_as: str = ""
+    """whose simulation this is, where the torques are the same by `workbench.reference.alike`; empty: its own"""
 
 
 @dataclass(frozen=True)
@@ -208,17 +212,24 @@ def replay(
     limited_by = "duration" if window < stop - start else ""
 
     for _ in range(SHRINKINGS):
-        tracked = runner.run({REFERENCE: None}, window, COARSE_STEPS, factors=PROBES)
+        own = runner.torques({}, window, COARSE_STEPS)
+        tracked = runner.run(np.concatenate([factor * own for factor in PROBES]), window, COARSE_STEPS)
         away = ~np.all(np.abs(tracked) <= NEAR * stroke, axis=(0, 2))
         if not away.any():
             break
         window *= max(int(np.argmax(away)), 1) / COARSE_STEPS
         limited_by = "instability"
-    everyone = {REFERENCE: None, **torques}
-    errors = np.stack([runner.run(everyone, window, k * COARSE_STEPS, k) for k in HALVINGS], axis=1)
-    steps = window / COARSE_STEPS / np.array(HALVINGS)
-    labels = _labels(reference)
-    replays = {name: _judge(errors[i], steps, stroke, labels) for i, name in enumerate(everyone)}
+    names = [REFERENCE, *torques]
+    driven = [runner.torques(torques, window, k * COARSE_STEPS) for k in HALVINGS]
+    first = first_alike(driven)
+    simulated = sorted(set(first))
+    errors = [runner.run(tau[simulated], window, k * COARSE_STEPS, k) for k, tau in zip(HALVINGS, driven, strict=True)]
+    steps, labels = window / COARSE_STEPS / np.array(HALVINGS), _labels(reference)
+    judged = [_judge(one, steps, stroke, labels) for one in np.stack(errors, axis=1)]
+    replays = {
+        name: dataclasses.replace(judged[simulated.index(i)], same_as="" if names[i] == name else names[i])
+        for name, i in zip(names, first, strict=True)
+    }
     return ReplaySet(start, start + window, stop, limited_by, stroke, replays)
 
 
@@ -231,33 +242,27 @@ class _Runner:
         self._last: tuple[FloatArray, FloatArray] = np.zeros(0), np.zeros(0)
         """times and the reference's torques: the last probe and the coarsest replay ask for the same"""
 
-    def run(
-        self,
-        torques: Mapping[str, TorqueAt | None],
-        window: float,
-        steps: int,
-        every: int = 1,
-        factors: tuple[float, ...] = (1.0,),
-    ) -> FloatArray:
-        """Tracking errors ``(candidates * factors, steps / every, na)``: joint coordinates less those of the motion.
-
-        Torques None are the reference's own, which closes its loops along the motion.
-        """
-        structure = self._reference.structure
+    def torques(self, torques: Mapping[str, TorqueAt], window: float, steps: int) -> FloatArray:
+        """Torques in the middle of each step ``(1 + candidates, steps, na)``: the reference's own come first."""
         step = window / steps
-        model = near_rigid(self._reference.spec(), step, self._pull())
         times = _times(self._start + 0.5 * step, step, steps)
         middle = self._motion_at(times)
-        applied = np.zeros((len(torques) * len(factors), steps, model.nv))
-        for i, (name, torque) in enumerate(torques.items()):
-            tau = self._own(times, middle) if torque is None else np.asarray(torque(*middle), dtype=np.float64)
+        found = [self._own(times, middle)]
+        for name, torque in torques.items():
+            tau = np.asarray(torque(*middle), dtype=np.float64)
             if tau.shape != middle[0].shape:
                 raise ArrayError(f'candidate "{name}": expected tau of shape {middle[0].shape}, got {tau.shape}')
-            for j, factor in enumerate(factors):
-                applied[i * len(factors) + j][:, structure.actuated] = factor * tau
-        lost = ~np.isfinite(applied).all(axis=(1, 2))
+            found.append(tau)
+        return np.stack(found)
+
+    def run(self, tau: FloatArray, window: float, steps: int, every: int = 1) -> FloatArray:
+        """Joint coordinates less those of the motion, ``(k, steps / every, na)``, under torques ``(k, steps, na)``."""
+        structure, count, step = self._reference.structure, len(tau), window / steps
+        model = near_rigid(self._reference.spec(), step, self._pull())
+        applied = np.zeros((count, steps, model.nv))
+        applied[:, :, structure.actuated] = tau
+        lost = ~np.isfinite(tau).all(axis=(1, 2))
         applied[lost] = 0.0
-        count = len(applied)
         batch = Batch(model, count, min(count, self._reference.threads))
         batch.qpos = np.repeat(self._initial.qpos, count, axis=0)
         batch.qvel = np.repeat(self._initial.qvel, count, axis=0)
@@ -322,7 +327,7 @@ def near_rigid(spec: mujoco.MjSpec, step: float, pull: tuple[str, FloatArray] | 
     option.tolerance = 1e-12
     # torques are applied to the joints themselves, whatever the actuators' gears and limits are
     flags = mujoco.mjtDisableBit
-    option.disableflags |= flags.mjDSBL_CONTACT.value | flags.mjDSBL_AUTORESET.value
+    option.disableflags |= flags.mjDSBL_CONTACT.value | flags.mjDSBL_AUTORESET.value | flags.mjDSBL_ISLAND.value
     for actuator in spec.actuators:
         actuator.group = SILENT
     option.disableactuator |= 1 << SILENT

@@ -85,7 +85,9 @@ def _replay_table(run: Run, record: CaseRecord, anchor: str) -> Table:
             Cell(_joint_heading(run, replay.worst_joint)),
             *(Cell(exact(error, 3), error) for error in _errors(run, replay, len(steps))),
             Cell(exact(replay.limit, 3), replay.limit),
-            Cell(replay.text),
+            Cell(
+                f"{replay.text}; simulated with {replay.same_as}: the same torques" if replay.same_as else replay.text
+            ),
         )
         for name, replay in replays.items()
     ]

@@ -148,6 +148,7 @@ class ReplayRecord(Record):
     """extrapolated to a step of zero, on the worst joint"""
     verdict: str = ""
     text: str = ""
+    same_as: str = ""  # whose simulation this is, of the same torques; empty: its own
 
 
 class ReplaySetRecord(Record):
