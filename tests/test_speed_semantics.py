@@ -339,8 +339,12 @@ def test_the_prepared_callable_refuses_as_the_method_does(robot: str) -> None:
         kernel(q, qd, qdd, out=np.empty(4))
     with pytest.raises(ArrayError, match=r"^qdd: sample 0, column 1 is nan"):
         kernel(q, qd, np.array([0.0, np.nan, 0.0]))
-    with pytest.raises(MotionError, match=r"^sample 0, joint q1"):
-        kernel(np.array([9.0, 0.4, 0.4]), qd, qdd)
+    far = np.array([9.0, 0.4, 0.4])
+    with pytest.raises(MotionError, match=r"^sample 0, joint q1") as refused:
+        mechanism.inverse_dynamics(far[None], qd[None], qdd[None])
+    with pytest.raises(MotionError) as one:
+        kernel(far, qd, qdd)
+    assert str(one.value) == str(refused.value)
     with pytest.raises(ParameterError, match='unknown mass model "lumpy"; did you mean "lumped"'):
         mechanism.kernel("lumpy")
 

@@ -44,6 +44,37 @@ def share_inside(workspace: Workspace, points: np.ndarray, border: int) -> float
     return float(np.mean([any(grid[tuple(i + s)] for s in shifts) for i in index]))
 
 
+def test_a_position_is_in_reach_where_inverse_kinematics_does_not_refuse_it(mechanism: Robot) -> None:
+    rng = np.random.default_rng(7)
+    low, high = mechanism.reach_box()
+    points = rng.uniform(low - 0.3, high + 0.3, (300, 3))
+    found = mechanism.reach(points)
+    alone = np.full((300, 3), np.nan)
+    for i, point in enumerate(points):
+        try:
+            alone[i] = mechanism.inverse_kinematics(point[None])[0]
+        except MotionError:
+            continue
+    q = np.where(found.reachable[:, None], found.q, np.nan)
+    refused = np.isnan(alone).any(axis=1)
+    assert 20 < refused.sum() < 280
+    assert not (found.reachable & refused).any()
+    assert np.array_equal(q[found.reachable], alone[found.reachable])
+    assert np.isfinite(found.condition[found.reachable]).all()
+    if mechanism.name == "planar_4rprp":  # its inverse kinematics knows one assembly; the other's counts hanging rods
+        assert np.array_equal(found.reachable, ~refused)
+
+
+def test_the_box_holds_every_pose_and_is_no_larger_than_limbs_are_long(mechanism: Robot) -> None:
+    low, high = mechanism.reach_box()
+    points = poses(mechanism, 400)
+    assert (points >= low).all()
+    assert (points <= high).all()
+    if mechanism.name == "planar_4rprp":
+        longest = max(limit for _, limit in mechanism.joint_limits)
+        assert [*low, *high] == [0.0, 0.0, mechanism.parameters.b - longest, longest, longest, longest]
+
+
 def test_every_pose_lies_in_it(mechanism: Robot) -> None:
     points = poses(mechanism, 400)
     if mechanism.name == "asym_2rss_ppap":
