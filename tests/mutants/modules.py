@@ -129,7 +129,7 @@ LONGER_TESTS: dict[str, tuple[str, ...]] = {
     "mjcf/": ("mjcf_assumptions", "robot_file", "importing", "urdf", "engine_warnings", "variants", "own_campaign"),
     "robots/": (
         "model_command", "models", "variants", "agreement", "actuators", "mass_models", "robot_folder", "statements",
-        "fuzz_mechanisms", "own_campaign", "library_formulas",
+        "fuzz_mechanisms", "own_campaign", "library_formulas", "friction", "speed_semantics", "workspace",
     ),
     "reference/forward": ("control_plant", "control_routes"),
     "reference/pinocchio": (),
