@@ -20,7 +20,7 @@ from workbench.errors import ModelError
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference, forward
 from workbench.reference.forward import Plant
-from workbench.reference.forward_kernels import Masses
+from workbench.reference.forward_kernels import Masses, accelerations
 
 AGREE = 1e-9
 SEEDS = (15, 57, 86)
@@ -99,3 +99,14 @@ def test_a_plant_that_differs_from_the_reference_is_refused(
     heavier(side * 3e-9)
     with pytest.raises(ModelError, match=r"control is not covered for this model: on joint q\d something acts"):
         Plant(reference)
+
+
+def test_a_mass_matrix_that_is_none_gives_no_accelerations(tmp_path: Path) -> None:
+    path = tmp_path / "model.xml"
+    path.write_text(three_rps())
+    plant = Plant(MujocoReference(path, setup=Setup(("q1", "q2", "q3"), "centre")))
+    plant.begin(plant.reference.home, np.zeros(3))
+    room, found = plant._room, np.empty(3)
+    assert accelerations(room, np.ones(3), found)
+    room.mass[2, 2] = -1.0
+    assert not accelerations(room, np.ones(3), found)

@@ -12,6 +12,7 @@ import pytest
 import workbench as wb
 from robots import FourBar, write_model
 from workbench.errors import MotionError
+from workbench.mjcf.setup import Setup
 from workbench.reference import along, closure, continuation, pinocchio_loops, sides
 from workbench.reference.pinocchio_reference import PinocchioReference
 
@@ -318,3 +319,31 @@ def test_neighbours_on_two_sides_are_no_motion(tmp_path: Path, monkeypatch: pyte
         monkeypatch.setattr(type(closer), "_on_side", lambda self, here, rows, *_: np.ones(len(rows), dtype=np.bool_))
     assert closer._linked(jumped, q).tolist() == [spoiled]
     assert spoiled or closer._linked(same, q).tolist() == [True]
+
+
+def test_rows_are_said_to_depend_on_the_joints_that_they_depend_on(tmp_path: Path) -> None:
+    """A tendon held alone, two tied together, two joints tied, a joint held alone: no row knows of another's joints."""
+    names = "abcdefgh"
+    bodies = "".join(
+        f'<body pos="0 {k} 0"><joint name="{name}" axis="0 1 0"/><geom size=".1" mass="1" pos=".2 0 0"/>'
+        f'<site name="s{name}"/></body>'
+        for k, name in enumerate(names)
+    )
+    pairs = {"alone": "ab", "first": "cd", "second": "de", "last": "fg"}
+    tendons = "".join(
+        f'<fixed name="{tendon}">' + "".join(f'<joint joint="{joint}" coef="{k}"/>' for joint in pair) + "</fixed>"
+        for k, (tendon, pair) in enumerate(pairs.items(), 1)
+    )
+    text = (
+        f"<mujoco><worldbody>{bodies}</worldbody><tendon>{tendons}</tendon><equality>"
+        '<tendon tendon1="alone"/><tendon tendon1="first" tendon2="second"/><tendon tendon1="last"/>'
+        '<joint joint1="h" joint2="e"/></equality></mujoco>'
+    )
+    path = tmp_path / "model.xml"
+    path.write_text(text, encoding="utf-8")
+    closer = wb.MujocoReference(path, setup=Setup(("a", "c", "d", "f"), "sa"))._closer
+    pattern, group = sides.pattern_of(closer.structure, closer.joints[2])
+    rows = closer.jacobian(closer.home)
+    assert np.array_equal(pattern, rows != 0.0)
+    assert group.tolist() == [0, 1, 2, 3]
+    assert pattern.sum(axis=1).tolist() == [2, 3, 2, 2]

@@ -61,6 +61,8 @@ def test_a_position_is_in_reach_where_inverse_kinematics_does_not_refuse_it(mech
     assert not (found.reachable & refused).any()
     assert np.array_equal(q[found.reachable], alone[found.reachable])
     assert np.isfinite(found.condition[found.reachable]).all()
+    for name, values in mechanism.singularity_measures(q[found.reachable]).items():
+        np.testing.assert_allclose(found.measures[name][found.reachable], values, rtol=1e-9)
     if mechanism.name == "planar_4rprp":  # its inverse kinematics knows one assembly; the other's counts hanging rods
         assert np.array_equal(found.reachable, ~refused)
 
