@@ -120,6 +120,36 @@ def test_a_lopsided_rod_of_two_bodies(tmp_path: Path) -> None:
     assert 0.0 < worth[0] < 10 * np.abs(off - on).max()
 
 
+def test_a_rod_that_is_made_round_keeps_mass_centre_and_inertia_along_its_axis() -> None:
+    """Of two bodies: the rod made round by numbers of its first body is measured anew, whole."""
+    cap = (
+        '<body pos=".3 .1 .1"><geom size=".012" pos=".0003 0 .02" mass=".03"/></body><site name="end" pos=".3 .1 .1"/>'
+    )
+    model = mujoco.MjModel.from_xml_string(rod(inside=cap))
+    closures = read_closures(model)
+    frames = Frames.of(closures.frames)
+    (one,) = idle_rods(model, closures.blocks)
+    before = RodFrame(model, one, frames)
+    centre, inertia = before._inertia()
+    place, wanted = before.rounded()
+    body, axis = before.group[0], (before.far - before.near) / before.length
+    moments, frame = np.linalg.eigh(wanted)
+    if np.linalg.det(frame) < 0:
+        frame[:, 0] *= -1
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(frame).ravel())
+    model.body_ipos[body], model.body_inertia[body], model.body_iquat[body] = place, moments, quaternion
+    after_centre, after = RodFrame(model, one, frames)._inertia()
+    assert axis @ after_centre == pytest.approx(axis @ centre, rel=1e-12)
+    assert np.linalg.norm(np.cross(axis, after_centre - before.near)) < 1e-13
+    assert np.linalg.norm(np.cross(axis, centre - before.near)) > 1e-4
+    along, whole = axis @ inertia @ axis, np.trace(inertia)
+    across = 0.5 * (whole - along)
+    expected = across * np.eye(3) + (along - across) * np.outer(axis, axis)
+    np.testing.assert_allclose(after, expected, atol=1e-12 * whole)
+    assert np.abs(inertia - expected).max() > 1e-6 * whole
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -306,3 +306,8 @@ def test_check_counts_a_motor_for_each_freedom(tmp_path: Path) -> None:
     assert any("few.xml: mobility 3, but 2 actuators; each freedom needs one" in line for line in found.broken)
     path.write_text(text)
     assert check_model(path, ranges=False).exit_code == 0
+    # one more than freedoms: none of them moves with the others held, so that there are no ranges to look for
+    more = re.sub(r'(<motor [^>]*joint="q3"[^>]*/>)', r'\1<motor joint="parallelogram_hinge_1"/>', text)
+    path.write_text(more)
+    found = check_model(path)
+    assert (found.exit_code, found.ranges) == (0, ())

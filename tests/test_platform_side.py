@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
+import scipy.linalg
 from scipy.spatial.transform import Rotation
 
 import workbench as wb
@@ -181,6 +183,26 @@ def test_order_and_threads_do_not_matter(tmp_path: Path) -> None:
     assert np.array_equal(one.reachable, other.reachable)
     assert 0.05 < one.reachable.mean() < 0.95
     assert np.array_equal(one.q, other.q, equal_nan=True)
+
+
+@pytest.mark.parametrize("name", ["asym_2rss_ppap", "planar_4rprp"])
+def test_condition_in_task_coordinates_is_that_of_pivots(name: str) -> None:
+    """Of the loops' rows and the platform's, by SciPy's factor of MuJoCo's Jacobians."""
+    path = ROOT / "models" / f"{name}.xml"
+    mech, reference = wb.load_mechanism(path), wb.MujocoReference(path)
+    home = mech.forward_kinematics(np.array(reference.home)[None])[0]
+    found = reference.reach(home + np.random.default_rng(0).uniform(-0.03, 0.03, (6, 3)))
+    still = np.zeros_like(found.q)
+    model, platform = reference.compiled(), np.zeros((3, reference.compiled().nv))
+    data = mujoco.MjData(model)
+    for k, qpos in enumerate(reference.inverse_dynamics(found.q, still, still).qpos):
+        data.qpos = qpos
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_jacSite(model, data, platform, None, reference._structure.platform_site)
+        rows = np.vstack([reference._closer.jacobian(qpos), platform])
+        pivots = np.abs(np.diag(scipy.linalg.qr(rows, pivoting=True, mode="r")[0]))
+        assert found.condition[k] == pytest.approx(pivots[0] / pivots[model.nv - 1], rel=1e-10)
 
 
 def test_marked_poses_are_those_of_the_closed_form() -> None:

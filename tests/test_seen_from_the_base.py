@@ -1,10 +1,15 @@
-"""Orientation seen from a base that stands turned, against rotations of SciPy."""
+"""Platforms seen from a base that stands anywhere: turns against SciPy, motion against the same robot in the origin."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from own_mechanisms import FOURBAR
+from workbench.mjcf.setup import Setup
+from workbench.reference import MujocoReference
 from workbench.reference.task_rows import relative
 
 
@@ -16,3 +21,23 @@ def test_orientation_seen_from_a_base_that_is_turned_any_way() -> None:
         relative.py_func(base.as_quat(scalar_first=True), seen.as_quat(scalar_first=True), found)
         expected = (base.inv() * seen).as_quat(scalar_first=True)
         assert min(np.abs(found - expected).max(), np.abs(found + expected).max()) < 1e-14
+
+
+def test_motion_seen_from_a_base_is_that_of_the_robot_in_the_origin(tmp_path: Path) -> None:
+    guess = (("crank", 1.0), ("elbow", -0.5), ("wrist", -1.5))
+    t = np.linspace(0.0, 1.0, 21)[:, None]
+    motion = 1.0 + 0.4 * np.sin(3 * t), 1.2 * np.cos(3 * t), -3.6 * np.sin(3 * t)
+    found = []
+    for place in ('pos="0 0 0"', 'pos="0.3 -0.7 1.1" euler="0.4 -0.7 1.1"'):
+        path = tmp_path / "model.xml"
+        path.write_text(
+            FOURBAR.replace("<worldbody>", f'<worldbody><body name="stand" {place}>').replace(
+                "</worldbody>", "</body></worldbody>"
+            )
+        )
+        reference = MujocoReference(path, setup=Setup(("crank",), "coupler", base_body="stand", initial=guess))
+        found.append(reference.inverse_dynamics(*motion))
+    here, there = found
+    for one, other in ((here.x, there.x), (here.xd, there.xd), (here.xdd, there.xdd)):
+        assert np.abs(one - other).max() < 1e-13 * max(1.0, np.abs(one).max())
+    assert np.abs(here.tau - there.tau).max() > 1e-3  # gravity comes from elsewhere

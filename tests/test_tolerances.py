@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
 from workbench.reference.left_open import left_open
 from workbench.reference.power import power_balance
+from workbench.reference.tolerance import INCONSISTENT, Tolerance
 
 GUESS = (("crank", 1.0), ("elbow", -0.5), ("wrist", -1.5))
 SETUP = Setup(("crank",), "coupler", initial=GUESS)
@@ -72,6 +74,14 @@ def test_spherical_loops_of_six_digits_are_closed_by_least_squares(tmp_path: Pat
     assert 1e-9 < off < 1e-4
     assert 0.1 * off < worth < 10 * off
     assert not one.slack.any()
+
+
+def test_rates_of_loops_of_few_digits_may_disagree_ten_times_as_far() -> None:
+    few = Tolerance(size=2.0, closed=1e-13, allowed=1e-6, few_digits=True)
+    assert (few.residual, few.velocity) == (1e-6, pytest.approx(1e-5))
+    exact = dataclasses.replace(few, few_digits=False)
+    assert exact.residual == exact.closed
+    assert exact.velocity == pytest.approx(2.0 * INCONSISTENT)
 
 
 def test_a_tolerance_that_is_named_lets_it_run(tmp_path: Path) -> None:

@@ -139,7 +139,8 @@ LONGER_TESTS: dict[str, tuple[str, ...]] = {
     "reference/task": ("seen_from_the_base", "task_coordinates", "platform_side"),
     "reference/": (
         "compiled_closure", "reference_closure", "motion_along", "reference_linear", "counted_forces", "tolerances",
-        "large_machines", "reference_evidence",
+        "large_machines", "reference_evidence", "variants", "shelf", "mjcf_assumptions", "seen_from_the_base", "sides",
+        "platform_side", "plant_terms",
     ),
 }  # fmt: skip
 """Test files that what survives a short run has to survive as well, compiled and however long a test takes."""

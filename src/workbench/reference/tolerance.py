@@ -34,7 +34,7 @@ KEY = "closure_tolerance"
 """``<custom><text name="closure_tolerance" data="1e-4"/>``: metres, instead of `DIGITS` of the robot's size."""
 
 SPREAD = 10.0
-"""How many times further open than at home loops of few digits may come along a motion."""
+"""Of loops of few digits: how many times as far as they may stay open their rows may disagree, by unit of speed."""
 
 
 @dataclass(frozen=True)
