@@ -107,3 +107,10 @@ def test_dimension_of_intersections(first: int, second: int, common: int):
 def test_span_counts_independent_screws():
     basis = random_screws(3)
     assert screws.span(np.vstack([basis, basis @ np.eye(6), basis.sum(axis=0)])).shape == (6, 3)
+
+
+def test_many_displacements_at_once_are_each_by_itself():
+    each = [random_displacement() for _ in range(6)]
+    rotations, displacements = (np.array(part).reshape(2, 3, *part[0].shape) for part in zip(*each, strict=True))
+    together = screws.adjoint(rotations, displacements).reshape(6, 6, 6)
+    np.testing.assert_array_equal(together, [screws.adjoint(*one) for one in each])
