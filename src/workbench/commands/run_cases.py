@@ -1,11 +1,10 @@
-"""A campaign's cases, run and printed; figures of a case are drawn while the next ones are computed."""
+"""A campaign's cases, run and printed; a process draws figures of a case meanwhile, and writes the report."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
 from contextlib import closing, nullcontext
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,16 +53,21 @@ def run_cases_and_print(
         from workbench.console import print_outcome
         from workbench.diagnosis.brief import brief
         from workbench.rendering.run_pictures import RunPictures
-        from workbench.report import build_report
         from workbench.sweep.pick import pick_cases
         from workbench.terminal import CaseProgress
+
+        def report(stage: Path) -> None:
+            if drawing is None or not drawing.report(stage):
+                from workbench.report import build_report  # only here: what draws takes long to load
+
+                build_report(stage)
 
         with CaseProgress() as progress:
             outcome = run_campaign(
                 campaign,
                 only=only,
                 progress=progress,
-                report=partial(build_report, drawn=drawing.drawn) if drawing else build_report,
+                report=report,
                 pictures=RunPictures() if pictures else None,
                 drawing=drawing,
                 effort=dataclasses.replace(effort(), threads=cores()),  # one case after the other: each may take all
