@@ -20,8 +20,8 @@ from workbench.report.plot import Plot
 
 WORTH_IT = 12
 """Figures from which on a second process pays."""
-COLLECT_EVERY = 60
-"""Figures between two collections of garbage."""
+COLLECT_EVERY = 100
+"""Figures between two collections of garbage: eighty megabytes."""
 ROOM = 1 << 20
 """Bytes that may wait to be taken, so that the second process need not wait for the first."""
 

@@ -24,6 +24,7 @@ from typing import Any, BinaryIO
 from workbench.drawing_process import DRAWN, FAILED, WRITTEN
 from workbench.records import validated
 from workbench.report.build import DRAWN_STYLE, build_report
+from workbench.report.drawing import COLLECT_EVERY
 from workbench.report.drawn_from import Drawn, drawn_from
 from workbench.report.load import Run, rows_of
 from workbench.report.manifest import Manifest
@@ -86,9 +87,11 @@ def serve(tasks: queue.SimpleQueue[bytes], say: Say) -> None:
             if "report" in told:
                 report(Path(told["report"]), drawn, say)
                 continue
+            before = len(drawn) // COLLECT_EVERY
             with contextlib.suppress(Exception):
                 case(told, drawn, say)
-            gc.collect()
+            if len(drawn) // COLLECT_EVERY > before:
+                gc.collect()
 
 
 def _listen(source: BinaryIO, tasks: queue.SimpleQueue[bytes]) -> None:
