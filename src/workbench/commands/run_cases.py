@@ -12,6 +12,7 @@ from workbench.drawing_process import DrawingProcess
 from workbench.processes import cores
 
 if TYPE_CHECKING:
+    from workbench.campaign.cases import Case
     from workbench.campaign.evidence import Effort
     from workbench.campaign.spec import Campaign
 
@@ -51,14 +52,23 @@ def run_cases_and_print(
     with closing(DrawingProcess()) if worth else nullcontext() as drawing:
         from workbench.campaign.run import run_campaign
         from workbench.console import print_outcome
-        from workbench.diagnosis.brief import brief
         from workbench.rendering.run_pictures import RunPictures
-        from workbench.sweep.pick import pick_cases
         from workbench.terminal import CaseProgress
+
+        # loaded only where they are called
+        def pick(*given: Any) -> Campaign:
+            from workbench.sweep.pick import pick_cases
+
+            return pick_cases(*given)
+
+        def explain(cases: Sequence[Case], candidate: str, reference: str) -> list[str]:
+            from workbench.diagnosis.brief import brief
+
+            return brief(cases, candidate, reference)
 
         def report(stage: Path) -> None:
             if drawing is None or not drawing.report(stage):
-                from workbench.report import build_report  # only here: what draws takes long to load
+                from workbench.report import build_report
 
                 build_report(stage)
 
@@ -71,8 +81,8 @@ def run_cases_and_print(
                 pictures=RunPictures() if pictures else None,
                 drawing=drawing,
                 effort=dataclasses.replace(effort(), threads=cores()),  # one case after the other: each may take all
-                pick=pick_cases,
-                explain=brief,
+                pick=pick,
+                explain=explain,
                 **options,
             )
         print_outcome(outcome)

@@ -9,13 +9,16 @@ import os
 import sys
 import threading
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-from PIL import Image
 
 from workbench.rendering.dressing import dress
 from workbench.rendering.worker import MODEL, POSES, rendered
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 GHOSTS = "ghosts.npy"
 STILL, SHEET = "still-{}.webp", "sheet-{}.webp"
@@ -35,6 +38,8 @@ def film(folder: Path, width: int, height: int, columns: int, still: int) -> Non
     Each becomes a sheet of its frames, row by row, and a picture twice as large of the frame *still*. Where there are
     ghosts, ``(n, nq)``, they shine through every film.
     """
+    from PIL import Image  # a run only wants to know the names of files
+
     model = mujoco.MjModel.from_binary_path(str(folder / MODEL))
     model.vis.quality.offsamples, model.vis.quality.shadowsize = 0, SHADOWS
     films = np.load(folder / POSES)
@@ -57,6 +62,8 @@ def film(folder: Path, width: int, height: int, columns: int, still: int) -> Non
 
 
 def _smaller(picture: np.ndarray) -> Image.Image:
+    from PIL import Image
+
     return Image.fromarray(picture).reduce(FINER)
 
 
