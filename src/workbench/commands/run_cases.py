@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
 from collections.abc import Callable, Sequence
-from contextlib import closing, nullcontext
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,11 +50,19 @@ def run_cases_and_print(
     """
     # begun before what computes is loaded, which takes as long as to load what draws
     worth = cores() > 1 and len(only or spec.case) >= WORTH_IT
-    with closing(DrawingProcess()) if worth else nullcontext() as drawing:
+    with ExitStack() as stack:
+        drawing = stack.enter_context(closing(DrawingProcess())) if worth else None
+        # what modules hold stays: to look through it again and again takes a thirtieth of a run
+        stack.callback(gc.unfreeze)
+        stack.callback(gc.enable)
+        gc.disable()
         from workbench.campaign.run import run_campaign
         from workbench.console import print_outcome
         from workbench.rendering.run_pictures import RunPictures
         from workbench.terminal import CaseProgress
+
+        gc.freeze()
+        gc.enable()
 
         # loaded only where they are called
         def pick(*given: Any) -> Campaign:
