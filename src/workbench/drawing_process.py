@@ -23,8 +23,8 @@ from workbench import processes
 popen = subprocess.Popen
 """What starts the process."""
 
-WORKER = "workbench.report.drawing_worker"
-"""The module that runs in it."""
+WORKER = "import gc; gc.disable(); from workbench.report.drawing_worker import main; main()"
+"""What runs in it: nothing is looked through for garbage while modules are loaded."""
 PATIENCE_S = 60.0
 """How long the run waits for the next sign of life: a figure drawn, or the report written."""
 DRAWN, WRITTEN, FAILED = b"drawn\n", b"written\n", b"failed\n"
@@ -39,7 +39,7 @@ class DrawingProcess:
         self._said: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         try:
             self._process: subprocess.Popen[bytes] | None = popen(
-                processes.python_module(WORKER),
+                processes.python_code(WORKER),
                 env=processes.environment(),
                 cwd=Path(__file__).parent,  # libraries find nothing of the current directory
                 stdin=subprocess.PIPE,  # closed by the system when this process dies: then the other ends, too

@@ -101,7 +101,8 @@ def _listen(source: BinaryIO, tasks: queue.SimpleQueue[bytes]) -> None:
     os._exit(0)
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Serve, until the run that began this process ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal's Ctrl-C the run takes care
     if hasattr(os, "nice"):
         os.nice(NICE)
