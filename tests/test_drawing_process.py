@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import pytest
@@ -107,7 +108,7 @@ def test_what_was_drawn_meanwhile_is_taken(campaign: Path, tmp_path: Path, monke
     def report(stage: Path) -> None:
         with figure_style(DRAWN_STYLE):
             for case in told:
-                drawing_worker.case(case, drawn, said.append)
+                drawing_worker.case(case, drawn, said.append, Event())
         drawn_here.clear()
         drawing_worker.report(stage, drawn, said.append)
 
@@ -118,6 +119,23 @@ def test_what_was_drawn_meanwhile_is_taken(campaign: Path, tmp_path: Path, monke
     assert sorted(drawn_here) == ["figure-at-a-glance", "figure-one-2", "figure-robot"]
     assert said[-1] == WRITTEN
     assert files(tmp_path / "beside") == alone(campaign, tmp_path / "alone")
+
+
+def test_once_all_results_stand_the_report_draws_what_is_left(campaign: Path, tmp_path: Path) -> None:
+    told: list[Mapping[str, Any]] = []
+    drawn: dict[tuple[str, str], str] = {}
+    over = Event()
+
+    def say(_: bytes) -> None:
+        if len(drawn) == 3:
+            over.set()
+
+    with drawing() as process, pytest.MonkeyPatch.context() as patched:
+        patched.setattr(process, "case", told.append)
+        run_campaign(campaign, tmp_path / "run", drawing=process, effort=QUICK)
+    for case in told:
+        drawing_worker.case({**case, "directory": str(tmp_path / "run")}, drawn, say, over)
+    assert len(drawn) == 3
 
 
 def keys_of_what_is_drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:

@@ -55,9 +55,11 @@ def plots_of(told: Mapping[str, Any]) -> list[tuple[Plot, str]]:
     return [(plot, digests[plot.key]) for plot in plots]
 
 
-def case(told: Mapping[str, Any], drawn: dict[tuple[str, str], str], say: Say) -> None:
-    """Draw the figures of a case into *drawn*."""
-    for plot, digest in plots_of(told):
+def case(told: Mapping[str, Any], drawn: dict[tuple[str, str], str], say: Say, over: threading.Event) -> None:
+    """Draw the figures of a case into *drawn*, until all results stand: what is left, two processes draw."""
+    for plot, digest in [] if over.is_set() else plots_of(told):
+        if over.is_set():
+            return
         drawn[plot.key, digest] = plot.svg
         say(DRAWN)
 
@@ -76,28 +78,31 @@ def report(run_dir: Path, drawn: Drawn, say: Say) -> None:
         say(WRITTEN)
 
 
-def serve(tasks: queue.SimpleQueue[bytes], say: Say) -> None:
+def serve(tasks: queue.SimpleQueue[dict[str, Any]], say: Say, over: threading.Event) -> None:
     """Draw and write what is asked for, for ever."""
     drawn: dict[tuple[str, str], str] = {}
     gc.disable()
     gc.freeze()  # what the modules hold need not be looked through
     with figure_style(DRAWN_STYLE):
         while True:
-            told = json.loads(tasks.get())
+            told = tasks.get()
             if "report" in told:
                 report(Path(told["report"]), drawn, say)
                 continue
             before = len(drawn) // COLLECT_EVERY
             with contextlib.suppress(Exception):
-                case(told, drawn, say)
+                case(told, drawn, say, over)
             if len(drawn) // COLLECT_EVERY > before:
                 gc.collect()
 
 
-def _listen(source: BinaryIO, tasks: queue.SimpleQueue[bytes]) -> None:
-    """Read until the run that began this process ends, and end."""
+def _listen(source: BinaryIO, tasks: queue.SimpleQueue[dict[str, Any]], over: threading.Event) -> None:
+    """Read until the run that began this process ends, and end; *over* is set when it asks for its report."""
     for line in source:
-        tasks.put(line)
+        told = json.loads(line)
+        if "report" in told:
+            over.set()
+        tasks.put(told)
     os._exit(0)
 
 
@@ -106,9 +111,11 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal's Ctrl-C the run takes care
     if hasattr(os, "nice"):
         os.nice(NICE)
-    lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    tasks: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+    over = threading.Event()
     answers = os.dup(sys.stdout.fileno())
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever is printed must not get between the answers
     # not sys.stdin: its lock, held by the thread, aborts the interpreter when it ends
-    threading.Thread(target=_listen, args=(os.fdopen(os.dup(sys.stdin.fileno()), "rb"), lines), daemon=True).start()
-    serve(lines, partial(os.write, answers))
+    source = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
+    threading.Thread(target=_listen, args=(source, tasks, over), daemon=True).start()
+    serve(tasks, partial(os.write, answers), over)
