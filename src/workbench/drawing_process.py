@@ -25,7 +25,7 @@ popen = subprocess.Popen
 
 WORKER = "import gc; gc.disable(); from workbench.report.drawing_worker import main; main()"
 """What runs in it: nothing is looked through for garbage while modules are loaded."""
-PATIENCE_S = 60.0
+PATIENCE_S = 120.0
 """How long the run waits for the next sign of life: a figure drawn, or the report written."""
 DRAWN, WRITTEN, FAILED = b"drawn\n", b"written\n", b"failed\n"
 """What it says: of a figure, and of a report."""
