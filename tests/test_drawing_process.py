@@ -243,6 +243,18 @@ def test_it_ends_with_the_run_that_began_it_and_runs_no_code_from_where_it_is(tm
     )
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no copies of a process")
+def test_a_copy_of_itself_ends_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    code = "import os, time; copy = os.fork(); copy and os.write(1, b'%d\\n' % copy); time.sleep(600)"
+    popen = subprocess.Popen
+    monkeypatch.setattr(drawing_process, "popen", lambda _, **options: popen([sys.executable, "-c", code], **options))
+    with drawing() as process:
+        copy = int(process._said.get(timeout=60))
+        assert alive(copy)
+    while alive(copy):
+        time.sleep(0.02)
+
+
 def alive(number: int) -> bool:
     """Whether a process runs; one that has ended and that nobody has asked after does not."""
     try:
