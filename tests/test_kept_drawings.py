@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import RendererSVG
 
 from test_report import make_run
 from workbench.report import build, kept_drawings, layout, svg
 from workbench.report.build import build_report
-from workbench.report.layout import log_axis, stack
+from workbench.report.layout import figure_legend, legend, log_axis, stack
 from workbench.report.style import figure_style
 
 
@@ -127,4 +128,28 @@ def test_an_axis_draws_what_matplotlib_draws(monkeypatch: pytest.MonkeyPatch) ->
             patched.setattr(svg, "lighten", lambda figure: None)
             assert light == drawn()
         monkeypatch.setattr(layout, "LightAxes", Axes)
+        assert light == drawn()
+
+
+@pytest.mark.parametrize("style", ["page", "paper"])
+def test_words_and_legends_measured_once_are_drawn_as_by_matplotlib(
+    monkeypatch: pytest.MonkeyPatch, style: str
+) -> None:
+    def drawn() -> list[str]:
+        found = []
+        for names in (["a", "a long name\nover two lines", "", "Ωmega"], ["other"], ["with a gap below", "g"]):
+            figure = svg.new_figure(4.0, 3.0)
+            (axes,) = stack(figure, [1.0], header=2)
+            for name in names:
+                axes.plot([0.0, 1.0], [0.0, len(name)], marker="s", label=name)
+            figure_legend(figure, axes, columns=2)
+            legend(axes)
+            axes.text(0.5, 0.5, "turned\nby 30 degrees", rotation=30.0, va="center", fontsize=11)
+            found.append(svg.svg_of(figure, "figure-x"))
+        return found
+
+    with figure_style(style):
+        light = drawn()
+        monkeypatch.setattr(svg, "_renderer", RendererSVG)
+        monkeypatch.setattr(svg, "measure_once", lambda figure: None)
         assert light == drawn()

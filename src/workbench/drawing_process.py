@@ -1,15 +1,17 @@
-"""The process that draws figures of a run's cases while the next cases are computed; it never fails a run.
+"""The process that draws figures of a run's cases while the next cases are computed, and writes the run's report.
 
-It begins before the run has loaded what it computes with, so that what draws is loaded meanwhile. Each case is told to
-it as a line of JSON once its time series stands in the run directory to be; drawings come back as lines of JSON. Nobody
-waits for it: whatever becomes of it, what it has not drawn is drawn by the report.
+It begins before the run has loaded what it computes with, so that what draws is loaded meanwhile, and only there. Each
+case is told to it as a line of JSON once its time series stands in the run directory to be, and in the end that
+directory. It fails no run: where it is gone, or gives no sign of life, the run writes the report itself.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
+import os
 import queue
+import signal
 import subprocess
 import threading
 from collections.abc import Mapping
@@ -21,22 +23,23 @@ from workbench import processes
 popen = subprocess.Popen
 """What starts the process."""
 
-WORKER = "workbench.report.drawing_worker"
-"""The module that runs in it."""
-
-Drawn = Mapping[tuple[str, str], str]
-"""From a figure's key, and a digest of what it was drawn from, to the drawing."""
+WORKER = "import gc; gc.disable(); from workbench.report.drawing_worker import main; main()"
+"""What runs in it: nothing is looked through for garbage while modules are loaded."""
+PATIENCE_S = 120.0
+"""How long the run waits for the next sign of life: a figure drawn, or the report written."""
+DRAWN, WRITTEN, FAILED = b"drawn\n", b"written\n", b"failed\n"
+"""What it says: of a figure, and of a report."""
 
 
 class DrawingProcess:
-    """Tells a process of its own what to draw, and keeps what came."""
+    """Tells a process of its own what to draw and to write."""
 
     def __init__(self) -> None:
-        self._drawn: dict[tuple[str, str], str] = {}
         self._told: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._said: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         try:
             self._process: subprocess.Popen[bytes] | None = popen(
-                processes.python_module(WORKER),
+                processes.python_code(WORKER),
                 env=processes.environment(),
                 cwd=Path(__file__).parent,  # libraries find nothing of the current directory
                 stdin=subprocess.PIPE,  # closed by the system when this process dies: then the other ends, too
@@ -55,16 +58,27 @@ class DrawingProcess:
         """Have the figures of a case drawn, `workbench.campaign.drawn.case_to_draw`; returns at once."""
         self._told.put(json.dumps(told, ensure_ascii=True).encode("ascii") + b"\n")
 
-    @property
-    def drawn(self) -> Drawn:
-        """What has come until now."""
-        return self._drawn
+    def report(self, run_dir: Path) -> bool:
+        """Have the report of a run directory written and wait for it; where that fails, the process has ended."""
+        if self._process is not None:
+            self.case({"report": str(run_dir.resolve())})
+            with contextlib.suppress(queue.Empty):
+                while (said := self._said.get(timeout=PATIENCE_S)) == DRAWN:
+                    pass
+                if said == WRITTEN:
+                    return True
+            self.close()
+            for torn in run_dir.rglob(f".*.{self._process.pid}.tmp"):  # it may have been about to write
+                torn.unlink()
+        return False
 
     def close(self) -> None:
         """End the process."""
         self._told.put(None)
         if self._process is None:
             return
+        if self._process.returncode is None and hasattr(os, "killpg"):
+            os.killpg(self._process.pid, signal.SIGKILL)  # with the copy of itself that may help it to draw
         self._process.kill()
         self._process.wait()
         for stream in (self._process.stdin, self._process.stdout):
@@ -82,7 +96,7 @@ class DrawingProcess:
 
     def _listen(self, process: subprocess.Popen[bytes]) -> None:
         assert process.stdout is not None
-        with contextlib.suppress(OSError, ValueError, KeyError, TypeError):  # the last line may be torn
+        with contextlib.suppress(OSError, ValueError):  # it is gone
             for line in process.stdout:
-                found = json.loads(line)
-                self._drawn[found["key"], found["from"]] = found["svg"]
+                self._said.put(line)
+        self._said.put(FAILED)

@@ -1,11 +1,11 @@
-"""A campaign's cases, run and printed; figures of a case are drawn while the next ones are computed."""
+"""A campaign's cases, run and printed; a process draws figures of a case meanwhile, and writes the report."""
 
 from __future__ import annotations
 
 import dataclasses
+import gc
 from collections.abc import Callable, Sequence
-from contextlib import closing, nullcontext
-from functools import partial
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from workbench.drawing_process import DrawingProcess
 from workbench.processes import cores
 
 if TYPE_CHECKING:
+    from workbench.campaign.cases import Case
     from workbench.campaign.evidence import Effort
     from workbench.campaign.spec import Campaign
 
@@ -49,26 +50,48 @@ def run_cases_and_print(
     """
     # begun before what computes is loaded, which takes as long as to load what draws
     worth = cores() > 1 and len(only or spec.case) >= WORTH_IT
-    with closing(DrawingProcess()) if worth else nullcontext() as drawing:
+    with ExitStack() as stack:
+        drawing = stack.enter_context(closing(DrawingProcess())) if worth else None
+        # what modules hold stays: to look through it again and again takes a thirtieth of a run
+        stack.callback(gc.unfreeze)
+        stack.callback(gc.enable)
+        gc.disable()
         from workbench.campaign.run import run_campaign
         from workbench.console import print_outcome
-        from workbench.diagnosis.brief import brief
         from workbench.rendering.run_pictures import RunPictures
-        from workbench.report import build_report
-        from workbench.sweep.pick import pick_cases
         from workbench.terminal import CaseProgress
+
+        gc.freeze()
+        gc.enable()
+
+        # loaded only where they are called
+        def pick(*given: Any) -> Campaign:
+            from workbench.sweep.pick import pick_cases
+
+            return pick_cases(*given)
+
+        def explain(cases: Sequence[Case], candidate: str, reference: str) -> list[str]:
+            from workbench.diagnosis.brief import brief
+
+            return brief(cases, candidate, reference)
+
+        def report(stage: Path) -> None:
+            if drawing is None or not drawing.report(stage):
+                from workbench.report import build_report
+
+                build_report(stage)
 
         with CaseProgress() as progress:
             outcome = run_campaign(
                 campaign,
                 only=only,
                 progress=progress,
-                report=partial(build_report, drawn=drawing.drawn) if drawing else build_report,
+                report=report,
                 pictures=RunPictures() if pictures else None,
                 drawing=drawing,
                 effort=dataclasses.replace(effort(), threads=cores()),  # one case after the other: each may take all
-                pick=pick_cases,
-                explain=brief,
+                pick=pick,
+                explain=explain,
                 **options,
             )
         print_outcome(outcome)

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from xml.sax.saxutils import quoteattr
 
 from workbench.errors import ModelError
 from workbench.mjcf.files import MAX_ASSETS, UnreadableError, below, read_asset, read_text
@@ -188,6 +187,8 @@ class _Reader:
         edits = [_value(text, element, attribute, key)]
         # an element without a name is called like its file
         if attribute == "file" and "name" not in attributes_of(text, element):
+            from xml.sax.saxutils import quoteattr  # loads what reads from the web
+
             place = element.start + 1 + len(element.tag)
             edits.append((place, place, f" name={quoteattr(PurePosixPath(name.replace(chr(92), '/')).stem)}"))
         return edits

@@ -16,13 +16,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from workbench.campaign.changed import ANOTHER, NOT_JUDGED
-from workbench.drawing_process import Drawn
 from workbench.errors import OutputError
 from workbench.report import kept_drawings
 from workbench.report.bibliography import NAME, bibliography, cited_keys
 from workbench.report.cost import cost_table
-from workbench.report.drawing import Beside, Show, draw
-from workbench.report.drawn_from import drawn_from
+from workbench.report.drawing import Show, draw
+from workbench.report.drawn_from import Drawn, drawn_from, take
 from workbench.report.latex import latex_table
 from workbench.report.load import Run, load_run, read_manifest
 from workbench.report.paper_table import paper_table
@@ -76,7 +75,7 @@ def build_report(
     second
         Whether a copy of this process may help to draw; not for programs with threads of their own.
     drawn
-        Drawings that a process makes of the same run meanwhile; they are taken where they show what is stored.
+        Drawings that were made of the same run meanwhile; they are taken where they show what is stored.
 
     Returns
     -------
@@ -165,10 +164,9 @@ def _rendered(
     kept = not {"html", "md"} & {*formats} and isinstance(run, Run)
     kept = kept and kept_drawings.take(figures, run.directory, style, plots)
     if {"html", "md", "pdf"} & {*formats} and not kept:
-        beside = None
         if drawn is not None and style == DRAWN_STYLE and isinstance(run, Run):
-            beside = Beside(drawn, drawn_from(run, plots, unique_keys("case", run.manifest.cases)))
-        draw(plots, steps.to, second=second, beside=beside)
+            take(drawn, drawn_from(run, plots, unique_keys("case", run.manifest.cases)), plots)
+        draw([plot for plot in plots if "svg" not in vars(plot)], steps.to, second=second)
     for number, plot in enumerate(plots, 1):
         if "md" in formats:
             files[figures / f"{plot.key}.svg"] = standalone(plot.svg, plot.alt).encode()

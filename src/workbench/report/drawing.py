@@ -1,9 +1,7 @@
 """Draws the figures of a report, on two cores where a second one can help.
 
 The second process draws from the end and sends what is done; the first draws from the front, takes what came, and never
-waits: whatever becomes of the second, every figure gets drawn, and its bytes are the same whoever drew it. Beside a run
-the second process has begun with the first case, from the front (`workbench.drawing_process`); then the first draws
-from the end.
+waits: whatever becomes of the second, every figure gets drawn, and its bytes are the same whoever drew it.
 """
 
 from __future__ import annotations
@@ -13,19 +11,17 @@ import gc
 import multiprocessing
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection
 from typing import Any
 
-from workbench.drawing_process import Drawn
 from workbench.processes import cores
 from workbench.report.plot import Plot
 
 WORTH_IT = 12
 """Figures from which on a second process pays."""
-COLLECT_EVERY = 60
-"""Figures between two collections of garbage."""
+COLLECT_EVERY = 100
+"""Figures between two collections of garbage: eighty megabytes."""
 ROOM = 1 << 20
 """Bytes that may wait to be taken, so that the second process need not wait for the first."""
 
@@ -33,43 +29,19 @@ Show = Callable[[int, int], None]
 """Called with the number of figures that are drawn, and of all."""
 
 
-@dataclass(frozen=True)
-class Beside:
-    """Drawings that another process makes meanwhile, and what each of the report's figures shows, by its key."""
-
-    drawn: Drawn
-    digests: Mapping[str, str]
-
-    def take(self, plots: Sequence[Plot], drawn: set[int]) -> None:
-        """Give figures the drawings that have come of just what they show."""
-        for number, plot in enumerate(plots):
-            svg = self.drawn.get((plot.key, self.digests.get(plot.key, "")))
-            if svg is not None and number not in drawn:
-                vars(plot)["svg"] = svg  # where the property keeps it
-                drawn.add(number)
-
-
-def draw(
-    plots: Sequence[Plot], show: Show | None = None, *, second: bool = False, beside: Beside | None = None
-) -> None:
-    """Draw all figures, each once, in the style that is set.
-
-    *second* allows a second process, where that pays; with *beside* another one is at it already.
-    """
-    fork = second and beside is None and len(plots) >= WORTH_IT and can_fork()
-    with _second(plots) if fork else contextlib.nullcontext() as sent:
+def draw(plots: Sequence[Plot], show: Show | None = None, *, second: bool = False) -> None:
+    """Draw all figures, each once, in the style that is set; *second* allows a second process, where that pays."""
+    with _second(plots) if second and len(plots) >= WORTH_IT and can_fork() else contextlib.nullcontext() as sent:
         drawn: set[int] = set()
-        for turn, number in enumerate(reversed(range(len(plots))) if beside else range(len(plots))):
-            if beside:
-                beside.take(plots, drawn)
+        for number, plot in enumerate(plots):
             _take(sent, plots, drawn)
             if show:
                 show(len(drawn), len(plots))
             if number in drawn:
                 continue
-            if turn % COLLECT_EVERY == COLLECT_EVERY - 1:
+            if number % COLLECT_EVERY == COLLECT_EVERY - 1:
                 gc.collect()
-            _ = plots[number].svg
+            _ = plot.svg
             drawn.add(number)
         if show:
             show(len(plots), len(plots))

@@ -9,6 +9,17 @@ from collections.abc import Mapping, Sequence
 from workbench.report.load import Run
 from workbench.report.plot import Plot
 
+Drawn = Mapping[tuple[str, str], str]
+"""From a figure's key, and a digest of what it was drawn from, to the drawing."""
+
+
+def take(drawn: Drawn, digests: Mapping[str, str], plots: Sequence[Plot]) -> None:
+    """Give figures the drawings there are of just what they show; *digests* is what `drawn_from` tells of them."""
+    for plot in plots:
+        svg = drawn.get((plot.key, digests.get(plot.key, "")))
+        if svg is not None:
+            vars(plot)["svg"] = svg  # where the property keeps it
+
 
 def drawn_from(run: Run, plots: Sequence[Plot], anchors: Mapping[str, str]) -> dict[str, str]:
     """Tell what each figure of a case shows from everything else that it could: series, rows, records and names.

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 
 from workbench.report.style import GRID
 
-_STEP = re.compile(r"([A-Zz])\s*(?:(-?[\d.]+(?:e-?\d+)?)[\s]+(-?[\d.]+(?:e-?\d+)?)((?:\s+-?[\d.]+)+)?)?")
+_LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _GROUP = re.compile(r"(</?g(?: [^<>]*)?>\n?)")
 _GRID_LINE = re.compile(rf'<path d="([^"]*)"((?: clip-path="[^"]*")?) (style="[^"]*stroke: {GRID}[^"]*")/>\n?')
 _TICK = re.compile(r'<defs>\s*<path id="([^"]*)" d="M0 0l(-?[\d.]+ ?-?[\d.]+)" style="[^"]*"/>\s*</defs>\n?')
@@ -28,13 +29,14 @@ def relative_path(path: str) -> str:
     The curve that matplotlib draws may leave the data by `path.simplify_threshold`, four of these tenths; steps lead
     from rounded place to rounded place, so that they do not add up to an error.
     """
+    closed = path.rstrip().endswith("z")
+    words = path.rstrip().removesuffix("z").split()
+    if len(words) % 3 or not set(words[::3]) <= {"M", "L"}:  # curves, of markers: short anyway
+        return _LONG_NUMBER.sub(lambda number: f"{float(number[0]):.2f}", path.replace("\n", ""))
     pieces: list[str] = []
     x = y = 0
     before = ""
-    closed = path.rstrip().endswith("z")
-    for kind, first, second, other in _STEP.findall(path.rstrip().removesuffix("z")):
-        if other or kind not in "ML":
-            return path  # curves, of markers: short anyway
+    for kind, first, second in zip(words[::3], words[1::3], words[2::3], strict=True):
         to_x, to_y = round(10 * float(first)), round(10 * float(second))
         if kind == "M":
             pieces.append("M" + _pair(to_x, to_y))
@@ -52,6 +54,7 @@ def _pair(x: int, y: int) -> str:
     return first + second if second[0] == "-" else f"{first} {second}"
 
 
+@lru_cache(10_000)
 def tenths(value: int) -> str:
     """Write a number of tenths without what is not needed: ``-.4``."""
     whole, tenth = divmod(abs(value), 10)
@@ -67,6 +70,8 @@ def merge_lines(svg: str) -> str:
 
 
 def _merged(part: str, ticks: Mapping[str, str]) -> str:
+    if "<path" not in part and "<use" not in part:
+        return part
     for clip, style in dict.fromkeys((match[2], match[3]) for match in _GRID_LINE.finditer(part)):
         lines = [match for match in _GRID_LINE.finditer(part) if (match[2], match[3]) == (clip, style)]
         whole = f'<path d="{"".join(match[1] for match in lines)}"{clip} {style}/>\n'

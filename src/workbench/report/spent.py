@@ -45,7 +45,7 @@ def spent_plot(run: Run, case: str, key: str, series: Series) -> Plot | None:
             off = EDGE_OFF * float(np.abs(edges).max())
             for side in edges:
                 # each edge is thinned once, so that the areas on its two sides leave no gap
-                seen = [corners(time, edge[None, :], off) for edge in side]
+                seen = [corners(time, edge, off) for edge in side]
                 for index, part in enumerate(parts):
                     low, high = seen[index], seen[index + 1]
                     if not np.any(side[index] != side[index + 1]):
@@ -72,20 +72,17 @@ def spent_plot(run: Run, case: str, key: str, series: Series) -> Plot | None:
     )
 
 
-def corners(time: FloatArray, curves: FloatArray, off: float) -> np.ndarray:
-    """Samples between which straight lines leave no curve ``(k, n)`` by more than *off* (Ramer, Douglas, Peucker)."""
+def corners(time: FloatArray, curve: FloatArray, off: float) -> np.ndarray:
+    """Samples between which straight lines leave a curve ``(n,)`` by no more than *off* (Ramer, Douglas, Peucker)."""
     kept, spans = {0, len(time) - 1}, [(0, len(time) - 1)]
     while spans:
         first, last = spans.pop()
         if last - first < 2:
             continue
-        between = slice(first + 1, last)
-        share = (time[between] - time[first]) / (time[last] - time[first])
-        line = curves[:, [first]] + (curves[:, [last]] - curves[:, [first]]) * share
-        gaps = np.abs(curves[:, between] - line).max(axis=0)
-        worst = int(gaps.argmax())
-        if gaps[worst] > off:
-            middle = first + 1 + worst
+        slope = (curve[last] - curve[first]) / (time[last] - time[first])
+        gaps = np.abs(curve[first:last] - curve[first] - slope * (time[first:last] - time[first]))
+        middle = first + int(gaps.argmax())
+        if gaps[middle - first] > off:
             kept.add(middle)
             spans += [(first, middle), (middle, last)]
     return np.array(sorted(kept))

@@ -17,15 +17,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG, RendererSVG
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
+from matplotlib.font_manager import FontProperties, fontManager, get_font
 from matplotlib.lines import Line2D
 from matplotlib.textpath import text_to_path
 
 from workbench.report.light_axis import lighten
+from workbench.report.light_legend import measure_once
 from workbench.report.shrink import Shapes, merge_lines, relative_path
 from workbench.report.style import THEME
 
 POINTS_PER_INCH = 72.0
+Heights = tuple[float, float, float] | tuple[None, None, None]
 OWN = "wb-"
 """Identifiers that begin so become classes, for the script to find."""
 OVER_TIME = f"{OWN}over-time"
@@ -36,13 +38,11 @@ _DECLARATIONS = re.compile(
 )
 _PATH = re.compile(r' d="([^"]*)"')
 _STYLE = re.compile(r' style="([^"]*)"')
-_GEOMETRY = re.compile(r'(?<= )d="[^"<>]*"')
 _PLACE = re.compile(r'(?<= )(?:x|y|transform)="[^"<>]*"')
 _NUMBER = re.compile(r"-?\d+\.\d+")
-_LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _UPRIGHT = re.compile(r' transform="rotate\(-?0 [^"]*"')
 _FONT = re.compile(r"font-family: [^;\"]*")
-_IDENTIFIER = re.compile(r'(?<=<)(\w+)([^<>]*?) id="([^"<>]*)"')
+_IDENTIFIER = re.compile(r'(?<=<)(\w+)((?: (?!id=)[^<>="]*="[^"<>]*")*) id="([^"<>]*)"')
 _REFERENCE = re.compile(r'(url\(#|href="#)([^")]+)')
 _GROUP = re.compile(r"<g(?: [^>]*[^>/])?>\n?|</g>\n?")
 _SVG_TAG = re.compile(r"<svg[^>]*>")
@@ -66,6 +66,7 @@ def svg_of(figure: Figure, key: str) -> str:
     """Draw *figure* as the body of an SVG document: no dates, two decimals, identifiers that start with *key*."""
     panels = _tag(figure)
     lighten(figure)
+    measure_once(figure)
     buffer = io.StringIO()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a name in another script: the reader's font has it
@@ -93,6 +94,9 @@ class _Renderer(RendererSVG):
     def get_text_width_height_descent(self, s: str, prop: FontProperties, ismath: Any) -> tuple[float, float, float]:
         return _measured(s, prop.copy(), ismath)  # a copy: it can be changed, and is a key
 
+    def _get_font_height_metrics(self, prop: FontProperties) -> Heights:
+        return _heights(prop.copy())
+
 
 _renderer: Any = _Renderer
 """matplotlib says no types of it"""
@@ -102,6 +106,20 @@ _renderer: Any = _Renderer
 def _measured(text: str, letters: FontProperties, is_math: Any) -> tuple[float, float, float]:
     found: tuple[float, float, float] = text_to_path.get_text_width_height_descent(text, letters, is_math)
     return found
+
+
+@lru_cache(100)
+def _heights(letters: FontProperties) -> Heights:
+    """Ascent, descent and gap between lines, points: what `Text` takes from the font's tables, each time anew.
+
+    Of a font without such a table None, three times: then `Text` looks for itself.
+    """
+    font: Any = get_font(fontManager._find_fonts_by_props(letters))
+    table, points = font.get_sfnt_table("OS/2"), letters.get_size_in_points()
+    if table is None:
+        return None, None, None
+    unit = 1 / font.get_sfnt_table("head")["unitsPerEm"] * points
+    return table["sTypoAscender"] * unit, -table["sTypoDescender"] * unit, table["sTypoLineGap"] * unit
 
 
 def _tag(figure: Figure) -> list[dict[str, Any]]:
@@ -148,11 +166,8 @@ def _is_curve(line: Line2D) -> bool:
 
 def compact(svg: str, key: str) -> str:
     """Strip what matplotlib adds around the drawing, shorten coordinates and make identifiers unique to *key*."""
-    svg = _DECLARATIONS.sub("", svg)
+    svg = _DECLARATIONS.sub("", svg, count=3)
     svg = _PATH.sub(lambda match: f' d="{relative_path(match[1])}"', svg)
-    svg = _GEOMETRY.sub(
-        lambda match: _LONG_NUMBER.sub(lambda number: f"{float(number[0]):.2f}", match[0].replace("\n", "")), svg
-    )
     svg = _PLACE.sub(
         lambda match: _NUMBER.sub(lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), match[0]), svg
     )

@@ -16,6 +16,7 @@ WHOLE_PERCENT_FROM = 9.995
 
 _MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]|#~$])")
 _NUMBERED = re.compile(r"q(\d+)")
+_CONTROL = dict.fromkeys(range(32), " ")
 _LINE_START = re.compile(r"^(?:([-+=])(?=[-=\s]|$)|(\d{1,9})([.)])(?=\s|$))")
 
 
@@ -89,7 +90,7 @@ def with_unit(text: str, unit: str) -> str:
 
 def escape_markdown(value: object) -> Markup:
     """Return user text as one line of Markdown that shows exactly this text: no markup, no HTML, no table breaks."""
-    text = " ".join("".join(c if c >= " " else " " for c in str(value)).split())
+    text = " ".join(str(value).translate(_CONTROL).split())
     text = _MARKDOWN_SPECIAL.sub(r"\\\1", text)
     text = _LINE_START.sub(lambda match: f"\\{match[1]}" if match[1] else f"{match[2]}\\{match[3]}", text)
     return Markup(html.escape(text, quote=False))
