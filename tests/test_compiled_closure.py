@@ -128,7 +128,7 @@ def test_machine_code_closes_loops_as_mujoco_does(tmp_path: Path) -> None:
                 assert found[0] == found[1]  # both refuse the same sample
                 continue
             one, other = found
-            well = one.condition < 100
+            well = other.condition < 100
             assert (one.rank == other.rank).all()
             assert fast._apart(one.qpos, other.qpos)[well].max(initial=0.0) < SAME
             compared += int(well.sum())

@@ -13,7 +13,15 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.compiled import borrowing, compiled, inlined
 from workbench.reference.kinds import BALL, CONNECT, FREE, WELD
-from workbench.reference.linear import Lengths, factor, room_to_factor, solve, solve_beside, solve_transposed
+from workbench.reference.linear import (
+    Elimination,
+    Lengths,
+    factor,
+    room_to_factor,
+    solve,
+    solve_beside,
+    solve_transposed,
+)
 from workbench.reference.rows import (
     acceleration_rows,
     body_accelerations,
@@ -126,7 +134,7 @@ def newton_step(  # type: ignore[no-untyped-def]
     m, nv, p, na = closures.block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
     a, beta, perm, lengths = room
-    step, work, x = np.zeros(nv), np.empty((p, p)), np.empty(p)
+    step, work, x = np.zeros(nv), Elimination(np.empty((p, p)), np.empty(p, dtype=np.int64)), np.empty(p)
     active = np.empty_like(ids)
     more = 0
     for n in range(ids.shape[0]):
@@ -168,6 +176,11 @@ def newton_step(  # type: ignore[no-untyped-def]
     return active[:more]
 
 
+DUST = 2.0**-52
+"""A row of a Jacobian shorter than this part of the whole is rounding of zero, as where a planar loop is held in space
+too. It is left out: what changes by that is no more than what the entries of the others are rounded by."""
+
+
 class ProjectionRoom(NamedTuple):
     """Room for the work of `projection` on one sample."""
 
@@ -178,8 +191,16 @@ class ProjectionRoom(NamedTuple):
     beta: FloatArray
     order: np.ndarray
     lengths: Lengths
+    columns: np.ndarray
+    """``(2, p)`` velocity address of each column to be factored, in the order of the last sample's pivots, and of each
+    pivot"""
+    kept: np.ndarray
+    """``(m,)`` rows that are factored"""
+    squares: FloatArray
+    """``(m,)`` squared lengths of rows"""
     force: FloatArray
     passive_force: FloatArray
+    kept_multipliers: FloatArray
     multipliers: FloatArray
     velocity: FloatArray
     """``(nbody, 6)`` spatial, as `acceleration`"""
@@ -192,21 +213,40 @@ def projection_room(rows: int, freedoms: int, passive: int, bodies: int) -> Proj
     """Room for a model of so many constraint rows, velocities, passive velocities and bodies."""
     m, nv, p, nb = rows, freedoms, passive, bodies
     return ProjectionRoom(
-        np.empty((m, nv)), np.empty(m), np.empty(m), *room_to_factor(m, p, 1), np.empty(nv), np.empty(p), np.empty(m),
+        np.empty((m, nv)), np.empty(m), np.empty(m), *room_to_factor(m, p, 1), np.empty((2, p), dtype=np.int64),
+        np.empty(m, dtype=np.int64), np.empty(m), np.empty(nv), np.empty(p), np.empty(max(m, p)), np.empty(m),
         np.empty((nb, 6)), np.empty((nb, 6)), np.empty((nb, 3)),
     )  # fmt: skip
+
+
+@inlined
+def _kept_rows(jac, passive, squares, kept):  # type: ignore[no-untyped-def]
+    """List the rows that are more than `DUST`; returns how many. What is no number is kept."""
+    whole = 0.0
+    for i in range(squares.shape[0]):
+        square = 0.0
+        for j in range(passive.shape[0]):
+            square += jac[i, passive[j]] * jac[i, passive[j]]
+        squares[i] = square
+        whole += square
+    count = 0
+    for i in range(squares.shape[0]):
+        kept[count] = i
+        count += not squares[i] <= DUST * DUST * whole
+    return count
 
 
 @borrowing
 def projection(  # type: ignore[no-untyped-def]
     closures, joints, split, bodies, poses, dynamics, mass_layout, platform, masses, gravity, base_rotation,
     base_position, qpos, qvel, tangent, qdd, applied, qacc, tau, closure_residual, velocity_residual,
-    acceleration_residual, motion, turning, reactions, slack, first, room,
+    acceleration_residual, rank, condition, weakest, motion, turning, reactions, slack, first, room,
 ):  # fmt: skip
     """Accelerations, actuator torques, platform motion and reaction forces of a block.
 
     With W the tangent (J W = 0), tau = W^T (M qacc + bias - applied): the constraint forces do no work along W. Their
-    least-norm values come from the same factor as qacc and are the loop reactions. ``mass`` holds M's lower triangle.
+    least-norm values come from the same factor as qacc and are the loop reactions; its pivots say ``rank (n,)``,
+    estimate ``condition (n,)`` and name the freedom that is ``weakest (n,)``. ``mass`` holds M's lower triangle.
     ``motion (3, n, 3)`` receives x, xd, xdd; ``turning``, three arrays, the platform site's rotation ``(n, 3, 3)``, its
     angular velocity and acceleration ``(n, 3)``; ``reactions (loops + joints, n, 3)`` forces; all in the base's frame.
     ``gravity (nbody, 3)`` is what pulls each body. ``slack (n, na)``, or empty, receives what the rows' disagreement is
@@ -224,6 +264,9 @@ def projection(  # type: ignore[no-untyped-def]
     a, beta, perm, lengths = room.a, room.beta, room.order, room.lengths
     force, passive_force, multipliers = room.force, room.passive_force, room.multipliers
     v, acc, carried = room.velocity, room.acceleration, room.carried
+    columns, pivots, kept = room.columns[0], room.columns[1], room.kept
+    for j in range(p):
+        columns[j] = passive[j]
     for s in range(qpos.shape[0]):
         constraint_rows(closures, joints, qpos[s], cdof[s], com[s], site_xpos[s], site_xquat[s], anchors[s], jac, res)
         worst, open_by = 0.0, 0.0
@@ -239,14 +282,27 @@ def projection(  # type: ignore[no-untyped-def]
         body_velocities(bodies, cdof[s], qvel[s], v)
         body_accelerations(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], acc)
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
-        for i in range(m):
-            a[i, p] = -rates[i]
+        count = _kept_rows(jac, passive, room.squares, kept)
+        for n in range(count):
+            i = kept[n]
+            a[n, p] = -rates[i]
             for j in range(p):
-                a[i, j] = jac[i, passive[j]]
-        rank = factor(a, beta, perm, lengths)
-        solve_beside(a, p, rank)
+                a[n, j] = jac[i, columns[j]]
+        high = max(count, p)
+        for n in range(count, high):
+            for j in range(p + 1):
+                a[n, j] = 0.0
+        rank[s] = found = factor(a[:high], beta, perm, lengths)
         for k in range(p):
-            qacc[s, passive[perm[k]]] += a[k, p]
+            pivots[k] = columns[perm[k]]
+        if p == 0:  # an open chain: nothing to solve for
+            condition[s], weakest[s] = 1.0, actuated[0]
+        else:
+            condition[s] = abs(a[0, 0] / a[p - 1, p - 1]) if found == p else math.inf
+            weakest[s] = pivots[min(found, p - 1)]
+        solve_beside(a, p, found)
+        for k in range(p):
+            qacc[s, pivots[k]] += a[k, p]
         body_accelerations(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], acc)
         acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
         worst = 0.0
@@ -264,8 +320,14 @@ def projection(  # type: ignore[no-untyped-def]
         _subtract_applied(cdof[s], com[s, root[body]], site_xpos[s, site], moving, depth[body], body, applied[s], force)
         # J_passive^T lambda = force at the passive freedoms; the rest of the balance is at the actuators
         for j in range(p):
-            passive_force[j] = force[passive[j]]
-        solve_transposed(a, beta, perm, rank, passive_force, multipliers)
+            passive_force[j] = force[columns[j]]
+        solve_transposed(a[:high], beta, perm, found, passive_force, room.kept_multipliers[:high])
+        for i in range(m):
+            multipliers[i] = 0.0
+        for n in range(count):
+            multipliers[kept[n]] = room.kept_multipliers[n]
+        for j in range(p):
+            columns[j] = pivots[j]
         for j in range(na):
             value = force[actuated[j]]
             for i in range(m):

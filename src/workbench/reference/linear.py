@@ -158,6 +158,70 @@ def solve_beside(a, p, rank):  # type: ignore[no-untyped-def]
             a[k, j], a[k, j + 1], a[k, j + 2], a[k, j + 3] = s0 / v, s1 / v, s2 / v, s3 / v
 
 
+class Elimination(NamedTuple):
+    """Room for `eliminate`."""
+
+    a: FloatArray
+    """``(p, columns)``"""
+    swaps: np.ndarray
+    """``(p,)`` with which row each was exchanged"""
+
+
+def room_to_eliminate(rows: int, beside: int = 0) -> Elimination:
+    """A square matrix with *beside* right-hand sides, for `solve_beside`."""
+    return Elimination(np.zeros((rows, rows + beside + SPARE)), np.zeros(rows, dtype=np.int64))
+
+
+@borrowing
+def eliminate(room, first, end, high, width, mean):  # type: ignore[no-untyped-def]
+    """Eliminate columns *first* to *end* - 1, pivots from the same rows, up to row *high* and column *width*.
+
+    Multipliers take the place of what is eliminated. Returns the determinant of these rows and columns: its sign
+    (whether it is negative), and its size over ``mean^(end - first)``, which is -1 for zero; then nothing else holds.
+    """
+    a, swaps = room.a, room.swaps
+    negative, volume = False, 1.0
+    for k in range(first, end):
+        pivot = k
+        for i in range(k + 1, end):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        swaps[k] = pivot
+        if pivot != k:
+            negative = not negative
+            for j in range(width):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        head = a[k, k]
+        if not abs(head) > 0.0:
+            return False, -1.0
+        negative ^= head < 0.0
+        volume *= abs(head) / mean
+        for i in range(k + 1, high):
+            scale = a[i, k] / head
+            if scale != 0.0:
+                a[i, k] = scale
+                for j in range(k + 1, width):
+                    a[i, j] -= scale * a[k, j]
+    return negative, volume
+
+
+@borrowing
+def solve_eliminated(room, x):  # type: ignore[no-untyped-def]
+    """Solve for one more right-hand side ``(p,)``, which the solution takes the place of."""
+    a, swaps = room.a, room.swaps
+    p = x.shape[0]
+    for k in range(p):
+        x[k], x[swaps[k]] = x[swaps[k]], x[k]
+    for i in range(p):
+        for k in range(i):
+            x[i] -= a[i, k] * x[k]
+    for i in range(p - 1, -1, -1):
+        s = x[i]
+        for k in range(i + 1, p):
+            s -= a[i, k] * x[k]
+        x[i] = s / a[i, i]
+
+
 @borrowing
 def solve(a, beta, perm, rank, rhs, x):  # type: ignore[no-untyped-def]
     """Least squares ``min |A x - rhs|``; returns the residual norm. ``rhs (m,)`` is overwritten by Q^T rhs.

@@ -258,7 +258,8 @@ class MujocoReference(PlatformSide):
         qpos, (qvel, qacc) = assembly.qpos, np.zeros((2, n, model.nv))
         tau, motion, energy = np.zeros_like(q), np.zeros((3, n, 3)), np.zeros((n, 2))
         turning = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
-        closure_residual, velocity_residual, acceleration_residual = np.zeros((3, n))
+        closure_residual, velocity_residual, acceleration_residual, condition = np.zeros((4, n))
+        rank, weakest = np.zeros((2, n), dtype=np.int64)
         # the kernel fills a row for every body, also for fixed ones that follow the last joint
         reactions = np.zeros((len(structure.blocks) + model.nbody, n, 3))
         velocities(assembly.tangent, qd, qvel)
@@ -279,15 +280,16 @@ class MujocoReference(PlatformSide):
                 *self._tables, poses.tables, dynamics.tables, self._mass_layout, platform, masses, gravity,
                 self._base_rotation, self._base_position, qpos[rows], qvel[rows], assembly.tangent[rows], qdd[rows],
                 force[rows], qacc[rows], tau[rows], closure_residual[rows], velocity_residual[rows],
-                acceleration_residual[rows], motion, tuple(array[rows] for array in turning), reactions, slack[rows],
-                rows.start, projection_room(structure.rows, model.nv, len(structure.passive), model.nbody),
+                acceleration_residual[rows], rank[rows], condition[rows], weakest[rows], motion,
+                tuple(array[rows] for array in turning), reactions, slack[rows], rows.start,
+                projection_room(structure.rows, model.nv, len(structure.passive), model.nbody),
             )  # fmt: skip
             energy[rows] = dynamics.energy[: rows.stop - rows.start]
 
         engine.in_blocks(block, n)
         # beyond this rate MuJoCo sets the state back; such samples are refused for their rates
         self._closer.confirm(np.where(np.abs(qvel).max(axis=1) < mujoco.mjMAXVAL, closure_residual, 0.0))
-        self._refuse_singular(q, qd, assembly.rank, velocity_residual, assembly.weakest)
+        self._refuse_singular(q, qd, rank, velocity_residual, weakest)
         refuse_overflow("torques", tau, qd)
         if times is not None:
             refuse_jumps(times, structure, self._closer.joints, qpos, qvel, qacc)
@@ -298,8 +300,8 @@ class MujocoReference(PlatformSide):
             tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], rotation=turning[0], omega=turning[1],
             alpha=turning[2], reactions=known,
             closure_residual=closure_residual, velocity_residual=velocity_residual,
-            acceleration_residual=acceleration_residual, rank=assembly.rank.copy(),
-            condition=assembly.condition.copy(), energy=energy, qpos=qpos.copy(), qvel=qvel, qacc=qacc,
+            acceleration_residual=acceleration_residual, rank=rank,
+            condition=condition, energy=energy, qpos=qpos.copy(), qvel=qvel, qacc=qacc,
             slack=slack if few_digits else np.zeros_like(tau),
         )  # fmt: skip
 
