@@ -75,6 +75,8 @@ class Bench(NamedTuple):
     same: np.ndarray
     work: Elimination
     """chosen rows (`workbench.reference.sides`): passive columns, actuated ones, the residual"""
+    products: Elimination
+    """for `same_side`, which must not write over the above"""
     sound: np.ndarray
     """``(1,)`` whether chosen rows were solved last, being a good measure of all"""
     residual: FloatArray
@@ -112,7 +114,7 @@ def bench(mechanism: Mechanism) -> Bench:
         places, seen, np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros((nv, na)),
         np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(2), np.zeros(2), np.zeros(2, dtype=np.int64),
         np.zeros((m, nv)), np.zeros((1, m, nv)), np.zeros((1, m, nv)), np.zeros(1, dtype=np.bool_),
-        room_to_eliminate(p, na + 1), np.zeros(1, dtype=np.bool_), np.zeros(m),
+        room_to_eliminate(p, na + 1), room_to_eliminate(p), np.zeros(1, dtype=np.bool_), np.zeros(m),
         *room_to_factor(m, p, na + 1), np.zeros(p), np.zeros(nv), np.zeros(nv),
         np.zeros(1), np.full(1, math.inf), np.zeros(1), np.zeros((5, nv)), np.zeros((4, na)),
     )  # fmt: skip

@@ -216,7 +216,7 @@ def _on_side(mechanism, w):  # type: ignore[no-untyped-def]
         qpos, rows = (w.kept, w.after[0]) if second else (w.here, w.before[0])
         _placed(mechanism, w, qpos)
         _rows(mechanism, w, qpos, rows)
-    same_side(w.before, w.after, table, w.work, w.same)
+    same_side(w.before, w.after, table, w.products, w.same)
     return w.same[0]
 
 
