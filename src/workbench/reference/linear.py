@@ -145,9 +145,9 @@ def solve_beside(a, p, rank):  # type: ignore[no-untyped-def]
 
     Row k becomes the solution's entry ``perm[k]``, for k < p; entries beyond the rank are zero.
     """
-    for k in range(rank, p):
+    for row in range(rank, p):
         for j in range(p, a.shape[1]):
-            a[k, j] = 0.0
+            a[row, j] = 0.0
     high = np.uint64(rank)
     for j in range(np.uint64(p), np.uint64(a.shape[1] - SPARE), FOUR):
         for n in range(high):
@@ -266,8 +266,8 @@ def solve_transposed(a, beta, perm, rank, rhs, y):  # type: ignore[no-untyped-de
         y[i] = 0.0
     for i in range(r):
         y[i] /= a[i, i]
-        for k in range(i + ONE, r):
-            y[k] -= a[i, k] * y[i]
+        for j in range(i + ONE, r):
+            y[j] -= a[i, j] * y[i]
     for n in range(r):
         k = r - ONE - n
         s = y[k]
