@@ -70,23 +70,6 @@ def _factored(passive, actuated, jacobian, residual, a, beta, order, lengths):  
     return rank
 
 
-@borrowing
-def solve_again(mechanism, w, rhs, x):  # type: ignore[no-untyped-def]
-    """Solve the rows of the last factor for ``rhs (m,)``, which is overwritten: passive velocities into ``x (nv,)``."""
-    table, passive = mechanism.sides, mechanism.passive
-    p = passive.shape[0]
-    if w.sound[0]:
-        for k in range(p):
-            w.x[k] = rhs[table.rows[k]]
-        solve_eliminated(w.work, w.x)
-        for k in range(p):
-            x[table.columns[k]] = w.x[k]
-    else:
-        solve(w.a, w.beta, w.order, np.int64(w.facts[1]), rhs, w.x)
-        for j in range(p):
-            x[passive[j]] = w.x[j]
-
-
 @merged
 def _placed(mechanism, w, qpos):  # type: ignore[no-untyped-def]
     """Evaluate the positions of one configuration, and how far its loops are open: `Bench.residual`."""
@@ -130,9 +113,11 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
         chord = chord and not good and w.least[0] <= DRAWN * last
         last = w.least[0]
         if chord:
-            for i in range(w.residual.shape[0]):
-                w.residual[i] = -w.residual[i]
-            solve_again(mechanism, w, w.residual, step)
+            for k in range(p):
+                w.x[k] = -w.residual[mechanism.sides.rows[k]]
+            solve_eliminated(w.work, w.x)
+            for k in range(p):
+                step[columns[k]] = w.x[k]
         else:
             _rows(mechanism, w, qpos, w.jacobian)
             side = _eliminated(mechanism, w)
@@ -175,6 +160,23 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     if not w.least[0] <= rules.closed:
         w.facts[1] = 0.0
     w.away[0] = math.inf
+
+
+@borrowing
+def solve_again(mechanism, w, rhs, x):  # type: ignore[no-untyped-def]
+    """Solve the rows of the last factor for ``rhs (m,)``, which is overwritten: passive velocities into ``x (nv,)``."""
+    table, passive = mechanism.sides, mechanism.passive
+    p = passive.shape[0]
+    if w.sound[0]:
+        for k in range(p):
+            w.x[k] = rhs[table.rows[k]]
+        solve_eliminated(w.work, w.x)
+        for k in range(p):
+            x[table.columns[k]] = w.x[k]
+    else:
+        solve(w.a, w.beta, w.order, np.int64(w.facts[1]), rhs, w.x)
+        for j in range(p):
+            x[passive[j]] = w.x[j]
 
 
 @merged

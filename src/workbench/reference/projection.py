@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.compiled import borrowing, inlined
+from workbench.compiled import borrowing, inlined, merged
 from workbench.reference.kernels import follow_tangent
 from workbench.reference.kinds import CONNECT, WELD
 from workbench.reference.linear import Lengths, factor, room_to_factor, solve_beside, solve_transposed
@@ -75,7 +75,7 @@ def projection_room(rows: int, freedoms: int, passive: int, bodies: int, samples
     )  # fmt: skip
 
 
-@inlined
+@merged
 def _need_rows(jac, passive, squares, needed):  # type: ignore[no-untyped-def]
     """Mark the rows that are more than `DUST`; what is no number is."""
     whole = 0.0
@@ -89,7 +89,7 @@ def _need_rows(jac, passive, squares, needed):  # type: ignore[no-untyped-def]
         needed[i] |= not squares[i] <= DUST * DUST * whole
 
 
-@inlined
+@merged
 def _factor_one(high, count, kept, columns, jac, rates, a, beta, order, lengths):  # type: ignore[no-untyped-def]
     """Factor one sample's rows, with the right-hand side along; returns the rank."""
     p = columns.shape[0]
@@ -105,25 +105,22 @@ def _factor_one(high, count, kept, columns, jac, rates, a, beta, order, lengths)
     return found
 
 
-@inlined
+@merged
 def _factor_group(size, high, count, kept, columns, jac, rates, many):  # type: ignore[no-untyped-def]
     """Factor *size* samples at once and solve for their right-hand sides; whether they agree and have full rank."""
     p, lanes = columns.shape[0], many.sums.shape[0]
-    for r in range(high):
-        for j in range(p + 1):
-            x = many.a[r * (p + 1) + j]
-            for n in range(lanes):
-                s = min(n, size - 1)  # the last sample stands for those that a short group lacks
-                if r >= count:
-                    x[n] = 0.0
-                elif j == p:
-                    x[n] = -rates[s, kept[r]]
-                else:
-                    x[n] = jac[s, kept[r], columns[j]]
-    if not factor_many(high, many):
-        return False
-    solve_many(many)
-    return True
+    for n in range(lanes):
+        s = min(n, size - 1)  # the last sample stands for those that a short group lacks
+        for r in range(count):
+            for j in range(p):
+                many.a[r * (p + 1) + j, n] = jac[s, kept[r], columns[j]]
+            many.a[r * (p + 1) + p, n] = -rates[s, kept[r]]
+        for r in range(count * (p + 1), high * (p + 1)):
+            many.a[r, n] = 0.0
+    agree = factor_many(high, many)
+    if agree:
+        solve_many(many)
+    return agree
 
 
 @borrowing
