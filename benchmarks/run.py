@@ -41,8 +41,8 @@ LITERAL = {
 BATCHES = (1, 100, 5000, 1_000_000)
 REFERENCE_SAMPLES = 5000
 ONCE = "MuJoCo evaluating the same states once"
-MOST_ONCE = 6.0
-"""So many times what MuJoCo needs may the reference take; three were wanted (docs/speed.md says what is between)."""
+MOST_ONCE = 3.0
+"""So many times what MuJoCo needs may the reference take along a motion (docs/speed.md says what is between)."""
 FREE = 1.8
 """A machine that gives two threads less than so many times the speed of one has no second core to spare."""
 
