@@ -40,7 +40,7 @@ def serve(robot: str, samples: int) -> None:
     # two motions in turn, so that nothing is at hand from the call before
     motions = [(q, qd, qdd), (q[:-1], qd[:-1], qdd[:-1])]
     whole = reference.inverse_dynamics(*motions[0], along=t[:, 0])
-    engine = reference._engine("distributed")
+    engine = (getattr(reference, "engine", None) or reference._engine)("distributed")  # versions name it differently
     for call, line in enumerate(sys.stdin):
         if not line.strip():
             break

@@ -128,7 +128,7 @@ def test_machine_code_closes_loops_as_mujoco_does(tmp_path: Path) -> None:
                 assert found[0] == found[1]  # both refuse the same sample
                 continue
             one, other = found
-            well = one.condition < 100
+            well = other.condition < 100
             assert (one.rank == other.rank).all()
             assert fast._apart(one.qpos, other.qpos)[well].max(initial=0.0) < SAME
             compared += int(well.sum())
@@ -148,6 +148,26 @@ def test_a_long_motion_meets_at_its_chunks_and_is_the_same_on_threads() -> None:
     # a sample is factored where it is closed, wherever the steps that led there had their factor from
     np.testing.assert_allclose(one.condition, before.condition, rtol=1e-10)
     assert one.velocity_residual.max() <= 1e-12 * np.abs(qd).max()
+
+
+@pytest.mark.parametrize("ordered", [True, False])
+def test_a_sample_among_others_is_what_it_is_alone(ordered: bool) -> None:
+    """Groups of samples are factored at once, where they agree; scattered ones differ in the order of their columns."""
+    t = np.linspace(0.0, 2.0, 150)
+    q, qd, qdd = sine_sum(np.random.default_rng(8), t, 0.9)
+    if not ordered:
+        mixed = np.random.default_rng(9).permutation(len(t))
+        q, qd, qdd = q[mixed], qd[mixed], qdd[mixed]
+    reference = wb.MujocoReference(MODEL)
+    whole = reference.inverse_dynamics(q, qd, qdd, along=t if ordered else None)
+    assert len(np.unique(whole.condition.round(3))) > 20
+    for s in range(0, len(t), 7):
+        near = reference._closer.close_near(q[s : s + 1], whole.qpos[s : s + 1])
+        alone = reference.inverse_dynamics(q[s : s + 1], qd[s : s + 1], qdd[s : s + 1], near=near)
+        assert np.abs(alone.tau[0] - whole.tau[s]).max() <= 1e-12 * np.abs(whole.tau).max()
+        assert alone.condition[0] == pytest.approx(whole.condition[s], rel=1e-8)
+        for name, force in whole.reactions.items():
+            assert np.abs(alone.reactions[name][0] - force[s]).max() <= 1e-11 * np.abs(force).max()
 
 
 def test_a_chunk_that_begins_on_another_assembly_is_followed_again(

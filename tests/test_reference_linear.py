@@ -8,7 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workbench.reference.kernels import keep_if_better
-from workbench.reference.linear import factor, least_squares, room_to_factor, solve_beside, solve_transposed
+from workbench.reference.linear import (
+    Elimination,
+    eliminate,
+    factor,
+    least_squares,
+    room_to_eliminate,
+    room_to_factor,
+    solve_beside,
+    solve_eliminated,
+    solve_transposed,
+)
+from workbench.reference.many import Many, factor_many, room_for_many, solve_many, solve_transposed_many
 
 TOLERANCE = 1e-11  # rounding of a factor with condition number up to about 100
 
@@ -157,3 +168,86 @@ def test_a_residual_that_is_no_number_closes_nothing(place: int) -> None:
     residual[place] = 1e-14
     again, closed = keep_if_better(residual, limits, np.array([1.0, 2.0]), kept, best, 0)
     assert (again, closed, best[0], kept.tolist()) == (True, True, 1e-14, [1.0, 2.0])
+
+
+def eliminated(matrix: np.ndarray, rhs: np.ndarray, sizes: tuple[int, ...]) -> tuple[Elimination, float]:
+    """All blocks eliminated with a right-hand side along; and the product of their determinants."""
+    p = len(matrix)
+    room, product = room_to_eliminate(p, 1), 1.0
+    room.a[:, :p], room.a[:, p] = matrix, rhs
+    for end, size in zip(np.cumsum(sizes), sizes, strict=True):
+        negative, volume = eliminate(room, end - size, end, p, p + 1, 1.0)
+        product *= -volume if negative else volume
+    return room, product
+
+
+@given(st.lists(st.integers(1, 5), min_size=1, max_size=3).map(tuple), st.integers(0, 2**32 - 1))
+def test_elimination_solves_block_by_block_in_any_order(sizes: tuple[int, ...], seed: int) -> None:
+    """Blocks see those before them; pivots stay in their block, wherever it stands."""
+    rng = np.random.default_rng(seed)
+    p, ends = sum(sizes), np.cumsum(sizes)
+    matrix = rng.normal(size=(p, p))
+    for end, size in zip(ends, sizes, strict=True):
+        block = slice(end - size, end)
+        matrix[block, end:] = 0.0
+        matrix[block, block] += 5.0 * np.eye(size)
+    moved = rng.permutation(len(sizes))
+    order = np.concatenate([np.arange(ends[k] - sizes[k], ends[k]) for k in moved])
+    matrix = matrix[np.ix_(order, order)]
+    first, second = rng.normal(size=(2, p))
+    room, product = eliminated(matrix, first, tuple(sizes[k] for k in moved))
+    assert product == pytest.approx(np.linalg.det(matrix), rel=1e-9)
+    again = second.copy()
+    solve_eliminated(room, again)
+    np.testing.assert_allclose(matrix @ again, second, atol=1e-9)
+    solve_beside(room.a, p, p)
+    np.testing.assert_allclose(matrix @ room.a[:, p], first, atol=1e-9)
+    flat = matrix.copy()
+    flat[:, 0] = 0.0
+    assert eliminate(Elimination(flat, room.swaps), 0, sizes[moved[0]], p, p, 1.0) == (False, -1.0)
+
+
+def side_by_side(matrices: np.ndarray, rhs: np.ndarray) -> Many:
+    lanes, rows, columns = matrices.shape
+    room = room_for_many(rows, columns, lanes)
+    room.a[:] = np.concatenate([matrices, rhs[:, :, None]], axis=2).reshape(lanes, -1).T
+    return room
+
+
+@pytest.mark.parametrize("lanes", [1, 7, 32])
+def test_many_systems_are_solved_as_each_by_itself(lanes: int) -> None:
+    rng = np.random.default_rng(lanes)
+    rows, columns = 9, 6
+    matrices = matrix_of_rank(rows, columns, columns, rng) + 1e-7 * rng.normal(size=(lanes, rows, columns))
+    rhs, wanted = rng.normal(size=(lanes, rows)), rng.normal(size=(lanes, columns))
+    room = side_by_side(matrices, rhs)
+    assert factor_many(rows, room)
+    ends = abs(room.a[0] / room.a[columns * columns + columns - 2])
+    solve_many(room)
+    solutions = room.x[:columns].copy()
+    room.x[:columns] = wanted[:, room.order].T
+    solve_transposed_many(rows, room)
+    for n in range(lanes):
+        a, beta, perm, lengths = room_to_factor(rows, columns)
+        a[:, :columns] = matrices[n]
+        assert factor(a, beta, perm, lengths) == columns
+        assert perm.tolist() == room.order.tolist()
+        assert ends[n] == pytest.approx(abs(a[0, 0] / a[columns - 1, columns - 1]), rel=1e-9)
+        np.testing.assert_allclose(solutions[:, n], np.linalg.lstsq(matrices[n], rhs[n])[0][room.order], rtol=1e-8)
+        np.testing.assert_allclose(room.x[:, n], np.linalg.pinv(matrices[n].T) @ wanted[n], rtol=1e-7, atol=1e-12)
+
+
+@pytest.mark.parametrize("odd", ["another order", "less rank", "no number"])
+def test_systems_that_do_not_go_together_are_not_solved_together(odd: str) -> None:
+    rng = np.random.default_rng(4)
+    matrices = np.repeat(rng.normal(size=(1, 8, 5)), 6, axis=0)
+    rhs = rng.normal(size=(6, 8))
+    assert factor_many(8, side_by_side(matrices, rhs))
+    longest = int(np.argmax(np.linalg.norm(matrices[0], axis=0)))
+    if odd == "another order":
+        matrices[3, :, (longest + 1) % 5] *= 100.0
+    elif odd == "less rank":
+        matrices[3, :, (longest + 1) % 5] = 0.0
+    else:
+        matrices[3, 2, longest] = np.nan
+    assert not factor_many(8, side_by_side(matrices, rhs))

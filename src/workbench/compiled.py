@@ -52,7 +52,7 @@ KERNEL_FILES = (
     *(f"robots/{name}.py" for name in ("blocks", "sine_cosine")),
     *(f"reference/{name}.py" for name in ("kernels", "rows", "linear", "kinds", "tables", "frames")),
     *(f"reference/{name}.py" for name in ("kinematics", "bench", "closing", "sides", "forward_kernels")),
-    *(f"reference/{name}.py" for name in ("task_rows", "platform_kernels")),
+    *(f"reference/{name}.py" for name in ("task_rows", "platform_kernels", "many", "projection")),
 )
 """What machine code is made of. A kernel calls into other files, and its cache must not outlive a change in those."""
 

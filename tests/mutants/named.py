@@ -28,6 +28,7 @@ EVIDENCE, CANDIDATE = "campaign/evidence.py", "campaign/candidate_spec.py"
 CONTINUATION, ALONG, CLOSURE = "reference/continuation.py", "reference/along.py", "reference/closure.py"
 SIDES = "reference/sides.py"
 PINOCCHIO, KERNELS, ROWS = "reference/pinocchio_loops.py", "reference/kernels.py", "reference/rows.py"
+LINEAR, PROJECTION = "reference/linear.py", "reference/projection.py"
 PLATFORM, REDUNDANT, REPLAY = "reference/platform_kernels.py", "reference/redundant.py", "reference/replay.py"
 REFERENCE, LOAD, VALUES = "reference/mujoco_reference.py", "robots/load.py", "robots/values.py"
 STRUCTURE, CHECK = "robots/assumptions/structure.py", "reference/check.py"
@@ -54,7 +55,8 @@ NAMED: dict[str, Named] = {
     "sides not looked at, second engine": Named(PINOCCHIO, "if small and self._same_side(jacobian, after) else None", "if small else None"),
     "rows that turn over are a jump": Named(SIDES, "same[s] &= volume >= 0.0 and not negative", "same[s] = False"),
     "rows that turn over are no jump": Named(SIDES, "same[s] &= volume >= 0.0 and not negative", "same[s] = True"),
-    "sign of a pivot dropped": Named(SIDES, "negative ^= head < 0.0", "negative ^= False"),
+    "samples that differ factored alike": Named("reference/many.py", "        if other:\n            return False\n", ""),
+    "sign of a pivot dropped": Named(LINEAR, "negative ^= head < 0.0", "negative ^= False"),
     "CORRECTION x 100, second engine": Named(PINOCCHIO, "CORRECTION = 0.1", "CORRECTION = 10.0"),
     "LONGEST_STEP x 100, second engine": Named(PINOCCHIO, "LONGEST_STEP = 0.2", "LONGEST_STEP = 20.0"),
     # checks of a model
@@ -64,7 +66,7 @@ NAMED: dict[str, Named] = {
     "places that disagree not refused": Named(LOAD, "    elif values is not None and elements is not None:", "    elif False:"),
     "rank of a pose not tested": Named(REFERENCE, "bad = (rank < len(structure.passive)) | ~(", "bad = ~("),
     "speed of a pose not tested": Named(REFERENCE, "bad = (rank < len(structure.passive)) | ~(residual <= self._closer.tolerance.velocity * speed)", "bad = rank < len(structure.passive)"),
-    "NaN in rates not seen": Named(KERNELS, "worst = math.inf if math.isnan(value) else max(worst, abs(value))", "worst = max(worst, abs(value))"),
+    "NaN in rates not seen": Named(PROJECTION, "worst = math.inf if math.isnan(value) else max(worst, abs(value))", "worst = max(worst, abs(value))"),
     "NaN speed passes": Named(REFERENCE, "| ~(residual <= self._closer.tolerance.velocity * speed)", "| (residual > self._closer.tolerance.velocity * speed)"),
     "rank at home not tested, second engine": Named(PINOCCHIO, "if rank < len(self.passive):", "if False:"),
     "open loops not checked": Named(CHECK, "if not self.residual <= self.closer.tolerance.residual:", "if False:"),
@@ -87,15 +89,15 @@ NAMED: dict[str, Named] = {
     "row of a spin halved": Named(ROWS, "                jac[row, d] = s\n", "                jac[row, d] = 0.5 * s\n"),
     "row of a tendon halved": Named(ROWS, "jac[row, dof_of[j]] += tendons[s1, j]", "jac[row, dof_of[j]] += 0.5 * tendons[s1, j]"),
     "row of the other tendon halved": Named(ROWS, "jac[row, dof_of[j]] -= slope * tendons[s2, j]", "jac[row, dof_of[j]] -= 0.5 * slope * tendons[s2, j]"),
-    "row of a weld's turn halved": Named(ROWS, "jac[row + i, d] += sign * cdof[d, i]", "jac[row + i, d] += 0.5 * sign * cdof[d, i]"),
-    "row of a connect halved": Named(ROWS, "jac[row + 1, d] += sign * (", "jac[row + 1, d] += 0.5 * sign * ("),
-    "third component of a turn zeroed": Named(ROWS, "        for i in range(3):\n            jac[row + i, d] += sign * cdof[d, i]", "        for i in range(2):\n            jac[row + i, d] += sign * cdof[d, i]"),
+    "row of a weld's turn halved": Named(ROWS, "jac[two, d] += sign * cdof[d, 1]", "jac[two, d] += 0.5 * sign * cdof[d, 1]"),
+    "row of a connect halved": Named(ROWS, "jac[two, d] += sign * (", "jac[two, d] += 0.5 * sign * ("),
+    "third component of a turn zeroed": Named(ROWS, "        jac[three, d] += sign * cdof[d, 2]\n", ""),
     "third component of a turn's residual zeroed": Named(ROWS, "sign * x, sign * y, sign * z", "sign * x, sign * y, 0.0"),
     "second component of a turn's residual zeroed": Named(ROWS, "sign * x, sign * y, sign * z", "sign * x, 0.0, sign * z"),
     "third component of a turn's rate zeroed": Named(ROWS, "out[row + 3 + i] = a[b1, i] - a[b2, i]", "out[row + 3 + i] = a[b1, i] - a[b2, i] if i < 2 else 0.0"),
     # an applied force
-    "moment arm of a force turned round": Named(KERNELS, "    rx, ry, rz = point[0] - com[0], point[1] - com[1], point[2] - com[2]\n    for k in range(depth):", "    rx, ry, rz = com[0] - point[0], com[1] - point[1], com[2] - point[2]\n    for k in range(depth):"),
-    "no moment arm": Named(KERNELS, "    rx, ry, rz = point[0] - com[0], point[1] - com[1], point[2] - com[2]\n    for k in range(depth):", "    rx, ry, rz = 0.0, 0.0, 0.0\n    for k in range(depth):"),
+    "moment arm of a force turned round": Named(PROJECTION, "    rx, ry, rz = point[0] - com[0], point[1] - com[1], point[2] - com[2]\n    for k in range(depth):", "    rx, ry, rz = com[0] - point[0], com[1] - point[1], com[2] - point[2]\n    for k in range(depth):"),
+    "no moment arm": Named(PROJECTION, "    rx, ry, rz = point[0] - com[0], point[1] - com[1], point[2] - com[2]\n    for k in range(depth):", "    rx, ry, rz = 0.0, 0.0, 0.0\n    for k in range(depth):"),
     "force turned round in replay": Named(REPLAY, "return name, reference.base_rotation @ self._force", "return name, -reference.base_rotation @ self._force"),
     "force not in the base's frame in replay": Named(REPLAY, "return name, reference.base_rotation @ self._force", "return name, self._force"),
     "force on the body's origin in replay": Named(REPLAY, "        target=site,\n", "        target=spec.site(site).parent.add_site(name='workbench end').name,\n"),

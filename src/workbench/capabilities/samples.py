@@ -17,7 +17,7 @@ def one_or_many(arrays: int) -> Callable[[Method], Method]:
     def decorate(method: Method) -> Method:
         @functools.wraps(method)
         def either(self: Any, *given: Any, **named: Any) -> Any:
-            if not given or np.ndim(given[0]) != 1:
+            if not given or (given[0].ndim if type(given[0]) is np.ndarray else np.ndim(given[0])) != 1:
                 return method(self, *given, **named)
             batch = [np.asarray(value)[None] for value in given[:arrays]]
             return _first(method(self, *batch, *given[arrays:], **named))

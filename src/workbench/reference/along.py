@@ -115,7 +115,7 @@ class OrderedClosure(Continuation):
         def chunk(_: Evaluator | None, rows: slice) -> None:
             if known[rows.start // CHUNK]:
                 ends[rows.start // CHUNK] = advance(
-                    mechanism, rules, bench(mechanism), CHAIN, q, q, rows.start + 1, rows.stop, *found.arrays, unused
+                    mechanism, rules, bench(mechanism), CHAIN, q, q, rows.start + 1, rows.stop, *found.closed, unused
                 )
 
         self.engine.in_blocks(chunk, n, CHUNK)

@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.arrays import FloatArray
 from workbench.reference.kinematics import Kinematics, Places, room
-from workbench.reference.linear import Lengths, room_to_factor
+from workbench.reference.linear import Elimination, Lengths, room_to_eliminate, room_to_factor
 from workbench.reference.sides import NO_SIDES, SideTable
 from workbench.reference.tables import ClosureTables
 
@@ -64,7 +64,7 @@ class Bench(NamedTuple):
     tangent_here: FloatArray
     tangent_before: FloatArray
     facts: FloatArray
-    """``(4,)`` residual, rank, condition, weakest"""
+    """``(2,)`` residual, rank"""
     facts_here: FloatArray
     sides: np.ndarray
     """``(2,)`` of the last closing, and here: on which side of their singular poses"""
@@ -73,10 +73,15 @@ class Bench(NamedTuple):
     """``(1, m, nv)``, as `after` and ``same (1,)`` for `same_side`"""
     after: FloatArray
     same: np.ndarray
-    work: FloatArray
+    work: Elimination
+    """chosen rows (`workbench.reference.sides`): passive columns, actuated ones, the residual"""
+    products: Elimination
+    """for `same_side`, which must not write over the above"""
+    sound: np.ndarray
+    """``(1,)`` whether chosen rows were solved last, being a good measure of all"""
     residual: FloatArray
     a: FloatArray
-    """``(m, .)`` passive columns of the Jacobian, actuated ones, the residual: what was factored last"""
+    """``(m, .)`` all rows likewise, where they are solved in least squares"""
     beta: FloatArray
     order: np.ndarray
     lengths: Lengths
@@ -107,8 +112,9 @@ def bench(mechanism: Mechanism) -> Bench:
         array.flags.writeable = False
     return Bench(
         places, seen, np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros(nq), np.zeros((nv, na)),
-        np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(4), np.zeros(4), np.zeros(2, dtype=np.int64),
+        np.zeros((nv, na)), np.zeros((nv, na)), np.zeros(2), np.zeros(2), np.zeros(2, dtype=np.int64),
         np.zeros((m, nv)), np.zeros((1, m, nv)), np.zeros((1, m, nv)), np.zeros(1, dtype=np.bool_),
-        np.zeros((p, p)), np.zeros(m), *room_to_factor(m, p, na + 1), np.zeros(p), np.zeros(nv), np.zeros(nv),
+        room_to_eliminate(p, na + 1), room_to_eliminate(p), np.zeros(1, dtype=np.bool_), np.zeros(m),
+        *room_to_factor(m, p, na + 1), np.zeros(p), np.zeros(nv), np.zeros(nv),
         np.zeros(1), np.full(1, math.inf), np.zeros(1), np.zeros((5, nv)), np.zeros((4, na)),
     )  # fmt: skip

@@ -15,9 +15,9 @@ from workbench.compiled import borrowing, merged
 from workbench.reference.kernels import follow_tangent, integrate, keep_if_better
 from workbench.reference.kinds import SPIN
 from workbench.reference.kinematics import place
-from workbench.reference.linear import factor, solve, solve_beside
+from workbench.reference.linear import factor, solve, solve_beside, solve_eliminated
 from workbench.reference.rows import jacobian_rows, residuals
-from workbench.reference.sides import UNKNOWN, same_side, side_of
+from workbench.reference.sides import POOR, UNKNOWN, eliminate_chosen, same_side
 
 NEAR, LINES, CHAIN = 0, 1, 2
 """Ways to close samples, see `advance`."""
@@ -34,6 +34,28 @@ ROUNDED = 1e-12
 
 
 @merged
+def _eliminated(mechanism, w):  # type: ignore[no-untyped-def]
+    """Solve the chosen rows of the closures for the actuated columns and the residual; returns the side.
+
+    `Bench.sound` says whether they are a good measure of all rows, far from singular poses; else nothing was solved.
+    """
+    table, actuated, a = mechanism.sides, mechanism.actuated, w.work.a
+    p, na = table.rows.shape[0], actuated.shape[0]
+    for i in range(p):
+        r = table.rows[i]
+        for j in range(p):
+            a[i, j] = w.jacobian[r, table.columns[j]]
+        for j in range(na):
+            a[i, p + j] = -w.jacobian[r, actuated[j]]
+        a[i, p + na] = -w.residual[r]
+    side, poorest = eliminate_chosen(table, w.work, p + na + 1)
+    w.sound[0] = p > 0 and poorest >= POOR
+    if w.sound[0]:
+        solve_beside(a, p, p)
+    return side
+
+
+@merged
 def _factored(passive, actuated, jacobian, residual, a, beta, order, lengths):  # type: ignore[no-untyped-def]
     """Factor the passive columns of the Jacobian, solve for the actuated ones and the residual; returns the rank."""
     p, na = passive.shape[0], actuated.shape[0]
@@ -46,25 +68,6 @@ def _factored(passive, actuated, jacobian, residual, a, beta, order, lengths):  
     rank = factor(a, beta, order, lengths)
     solve_beside(a, p, rank)
     return rank
-
-
-@merged
-def _noted(passive, actuated, a, order, found, tangent, facts):  # type: ignore[no-untyped-def]
-    """Velocities per actuated velocity, rank, condition and weakest freedom, from the last factor."""
-    p, na = passive.shape[0], actuated.shape[0]
-    for k in range(p):
-        d = passive[order[k]]
-        for j in range(na):
-            tangent[d, j] = a[k, p + j]
-    for k in range(na):
-        for j in range(na):
-            tangent[actuated[k], j] = 1.0 if k == j else 0.0
-    facts[1] = found
-    if p == 0:  # an open chain: nothing to solve for
-        facts[2], facts[3] = 1.0, actuated[0]
-    else:
-        facts[2] = abs(a[0, 0] / a[p - 1, p - 1]) if found == p else math.inf
-        facts[3] = passive[order[min(found, p - 1)]]
 
 
 @merged
@@ -89,16 +92,16 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     """Newton on the passive joints from `Bench.qpos`, which is overwritten.
 
     The best configuration met goes to `Bench.kept`, its residual to `Bench.facts`; where it is closed, also tangent,
-    rank, condition and weakest freedom. Near the pose of the last factor, as `Bench.away` says, steps are taken
-    with it as long as they converge; facts and tangent are always those of a factor of the closed pose itself.
+    rank and side. Near the pose of the last factor, as `Bench.away` says, steps are taken with it as long as they
+    converge; facts and tangent are always those of the closed pose itself.
     """
-    passive, actuated, qpos, step, x = mechanism.passive, mechanism.actuated, w.qpos, w.step, w.x
+    passive, actuated, columns = mechanism.passive, mechanism.actuated, mechanism.sides.columns
+    qpos, step = w.qpos, w.step
+    p, na = passive.shape[0], actuated.shape[0]
     limits = (rules.closed, rules.floor, rules.astray, rules.settles)
-    beside = w.away[0] <= BESIDE and w.facts[1] == passive.shape[0] and not rules.settles
+    beside = w.away[0] <= BESIDE and w.facts[1] == p and w.sound[0]
     w.least[0] = math.inf
     w.sides[0] = UNKNOWN
-    found = np.int64(w.facts[1])
-    w.facts[2], w.facts[3] = math.inf, 0.0
     for d in range(step.shape[0]):
         step[d] = w.corrected[0, d] = 0.0
     chord, last = beside, math.inf
@@ -110,25 +113,45 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
         chord = chord and not good and w.least[0] <= DRAWN * last
         last = w.least[0]
         if chord:
-            for i in range(w.residual.shape[0]):
-                w.residual[i] = -w.residual[i]
-            solve(w.a, w.beta, w.order, found, w.residual, x)
+            for k in range(p):
+                w.x[k] = -w.residual[mechanism.sides.rows[k]]
+            solve_eliminated(w.work, w.x)
+            for k in range(p):
+                step[columns[k]] = w.x[k]
         else:
             _rows(mechanism, w, qpos, w.jacobian)
-            found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order, w.lengths)
+            side = _eliminated(mechanism, w)
+            # loops that agree only to some digits are closed in least squares of all rows
+            w.sound[0] = w.sound[0] and not rules.settles
+            found = p
+            if w.sound[0]:
+                for k in range(p):
+                    d = columns[k]
+                    step[d] = w.work.a[k, p + na]
+                    if good:
+                        for j in range(na):
+                            w.tangent[d, j] = w.work.a[k, p + j]
+            else:
+                found = _factored(passive, actuated, w.jacobian, w.residual, w.a, w.beta, w.order, w.lengths)
+                for k in range(p):
+                    d = passive[w.order[k]]
+                    step[d] = w.a[k, p + na]
+                    if good:
+                        for j in range(na):
+                            w.tangent[d, j] = w.a[k, p + j]
             if good:
-                _noted(passive, actuated, w.a, w.order, found, w.tangent, w.facts)
+                for k in range(na):
+                    for j in range(na):
+                        w.tangent[actuated[k], j] = 1.0 if k == j else 0.0
+                w.facts[1] = found
                 if w.sides[0] == UNKNOWN or rules.settles:  # the step to rounding does not change it
-                    w.sides[0] = side_of(w.jacobian, found, mechanism.sides, w.work)
+                    w.sides[0] = side if found == p else UNKNOWN
             if not again:
                 break
-            for k in range(passive.shape[0]):
-                x[w.order[k]] = w.a[k, passive.shape[0] + actuated.shape[0]]
         longest = 0.0
-        for j in range(passive.shape[0]):
-            step[passive[j]] = x[j]
-            w.corrected[0, passive[j]] += x[j]
-            longest = max(longest, abs(x[j]))
+        for d in passive:
+            w.corrected[0, d] += step[d]
+            longest = max(longest, abs(step[d]))
         integrate(qpos, step, mechanism.joints, qpos)
         if good and beside and longest <= ROUNDED:
             _copy(qpos, w.kept)
@@ -137,6 +160,23 @@ def close_one(mechanism, rules, w):  # type: ignore[no-untyped-def]
     if not w.least[0] <= rules.closed:
         w.facts[1] = 0.0
     w.away[0] = math.inf
+
+
+@borrowing
+def solve_again(mechanism, w, rhs, x):  # type: ignore[no-untyped-def]
+    """Solve the rows of the last factor for ``rhs (m,)``, which is overwritten: passive velocities into ``x (nv,)``."""
+    table, passive = mechanism.sides, mechanism.passive
+    p = passive.shape[0]
+    if w.sound[0]:
+        for k in range(p):
+            w.x[k] = rhs[table.rows[k]]
+        solve_eliminated(w.work, w.x)
+        for k in range(p):
+            x[table.columns[k]] = w.x[k]
+    else:
+        solve(w.a, w.beta, w.order, np.int64(w.facts[1]), rhs, w.x)
+        for j in range(p):
+            x[passive[j]] = w.x[j]
 
 
 @merged
@@ -178,7 +218,7 @@ def _on_side(mechanism, w):  # type: ignore[no-untyped-def]
         qpos, rows = (w.kept, w.after[0]) if second else (w.here, w.before[0])
         _placed(mechanism, w, qpos)
         _rows(mechanism, w, qpos, rows)
-    same_side(w.before, w.after, table, w.work, w.same)
+    same_side(w.before, w.after, table, w.products, w.same)
     return w.same[0]
 
 
@@ -305,7 +345,7 @@ def _miss(mechanism, w, known):  # type: ignore[no-untyped-def]
 
 @borrowing
 def advance(  # type: ignore[no-untyped-def]
-    mechanism, rules, w, how, start, target, first, last, qpos, residual, tangent, rank, condition, weakest, side, done
+    mechanism, rules, w, how, start, target, first, last, qpos, residual, tangent, rank, side, done
 ):  # fmt: skip
     """Close samples *first* to *last* - 1 in one of three ways; a single kernel, which compiles once.
 
@@ -337,7 +377,6 @@ def advance(  # type: ignore[no-untyped-def]
                 _copy(qpos[r], w.here)
                 _copy_rows(tangent[r], w.tangent_here)
                 w.facts_here[0], w.facts_here[1] = residual[r], rank[r]
-                w.facts_here[2], w.facts_here[3] = condition[r], weakest[r]
                 w.sides[1] = side[r]
             if how == LINES:
                 _copy(start[s], w.ways[3])
@@ -355,5 +394,5 @@ def advance(  # type: ignore[no-untyped-def]
         _copy(w.here, qpos[s])
         _copy_rows(w.tangent_here, tangent[s])
         residual[s], rank[s] = w.facts_here[0], np.int64(w.facts_here[1])
-        condition[s], weakest[s], side[s] = w.facts_here[2], np.int64(w.facts_here[3]), w.sides[1]
+        side[s] = w.sides[1]
     return last

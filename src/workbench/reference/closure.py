@@ -182,7 +182,7 @@ class LoopCloser(OrderedClosure):
         found = self._nothing(count, aim.shape[1])
         if self.mechanism is not None:
             work = bench(self.mechanism)
-            advance(self.mechanism, self.rules(), work, NEAR, start, start, 0, count, *found.arrays, np.zeros(0))
+            advance(self.mechanism, self.rules(), work, NEAR, start, start, 0, count, *found.closed, np.zeros(0))
             return found
         qpos = evaluator.qpos
         qpos[:count] = start
@@ -214,7 +214,7 @@ class LoopCloser(OrderedClosure):
         rules = self.rules(marked_below or SMALLEST_STEP)
         advance(
             self.mechanism, rules, bench(self.mechanism), LINES, np.array(origin, order="C"),
-            np.array(target, order="C"), 0, len(target), *here.arrays, done,
+            np.array(target, order="C"), 0, len(target), *here.closed, done,
         )  # fmt: skip
         if (done < 1.0).any() and not marked_below:
             row = int(np.argmax(done < 1.0))

@@ -18,6 +18,7 @@ from workbench.arrays import FloatArray
 from workbench.reference.bench import Rules
 from workbench.reference.engine import Engine, Evaluator
 from workbench.reference.kernels import predict
+from workbench.reference.linear import room_to_eliminate
 from workbench.reference.sides import NO_SIDES, UNKNOWN, SideTable, same_side, side_at, side_table
 from workbench.reference.structure import IntArray, Structure
 from workbench.reference.tables import tables_of
@@ -71,7 +72,7 @@ class Assembly:
     rank: np.ndarray
     """``(n,)`` rank of the loop constraints (and of given rows) on the freedoms that are solved for"""
     condition: FloatArray
-    """``(n,)`` estimate of their condition number"""
+    """``(n,)`` estimate of their condition number; NaN where `workbench.reference.closing` closed them, unasked for"""
     weakest: np.ndarray
     """``(n,)`` velocity address of the freedom that they determine worst"""
     side: np.ndarray
@@ -85,7 +86,7 @@ class Assembly:
             residual=np.full(samples, np.inf),
             tangent=np.zeros((samples, nv, given)),
             rank=np.zeros(samples, dtype=np.int64),
-            condition=np.full(samples, np.inf),
+            condition=np.full(samples, np.nan),
             weakest=np.zeros(samples, dtype=np.int64),
             side=np.full(samples, UNKNOWN, dtype=np.int64),
         )
@@ -101,8 +102,13 @@ class Assembly:
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """The arrays as the kernels take them."""
+        """All arrays."""
         return self.qpos, self.residual, self.tangent, self.rank, self.condition, self.weakest, self.side
+
+    @property
+    def closed(self) -> tuple[np.ndarray, ...]:
+        """What `workbench.reference.closing` fills."""
+        return self.qpos, self.residual, self.tangent, self.rank, self.side
 
 
 class Continuation(ABC):
@@ -309,7 +315,7 @@ class Continuation(ABC):
         if len(doubtful):
             size, found = len(table.columns), np.zeros(len(doubtful), dtype=np.bool_)
             jacobians = self._solved(here.qpos[rows[doubtful]]), self._solved(closed.qpos[doubtful])
-            same_side(*jacobians, table, np.empty((size, size)), found)
+            same_side(*jacobians, table, room_to_eliminate(size), found)
             same[doubtful] = found
         return same
 

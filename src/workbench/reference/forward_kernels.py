@@ -16,10 +16,9 @@ import numpy as np
 from workbench.arrays import FloatArray
 from workbench.compiled import borrowing, compiled, merged, types
 from workbench.reference.bench import Mechanism
-from workbench.reference.closing import _copy, _copy_rows, _on_side, close_one
+from workbench.reference.closing import _copy, _copy_rows, _on_side, close_one, solve_again
 from workbench.reference.kernels import follow_tangent, integrate
 from workbench.reference.kinematics import FLOATING, TURNING, _turned
-from workbench.reference.linear import solve
 from workbench.reference.rows import acceleration_rows, point_motion
 from workbench.shielded import shielded
 
@@ -79,7 +78,6 @@ class Room(NamedTuple):
     carried_here: FloatArray
     """``(nv,)`` the same where the step began"""
     qvel: FloatArray
-    x: FloatArray
     rates: FloatArray
     v: FloatArray
     """``(nbody, 6)`` spatial velocities about each tree's fixed point"""
@@ -121,10 +119,10 @@ def hold(mechanism, rules, masses, bench, room):  # type: ignore[no-untyped-def]
 def room_for(mechanism: Mechanism) -> Room:
     """Room for one mechanism."""
     na, nv, nb = len(mechanism.actuated), len(mechanism.weights), len(mechanism.kinematics.parent)
-    m, p = int(mechanism.closures.block_rows[-1]), len(mechanism.passive)
+    m = int(mechanism.closures.block_rows[-1])
     return Room(
         np.zeros(na), np.zeros(na), np.zeros(na), np.zeros((na, na)), np.zeros(na), np.zeros(nv), np.zeros(nv),
-        np.zeros(nv), np.zeros(p), np.zeros(m), np.zeros((nb, 6)), np.zeros((nb, 6)), np.zeros((nb, 6)),
+        np.zeros(nv), np.zeros(m), np.zeros((nb, 6)), np.zeros((nb, 6)), np.zeros((nb, 6)),
         np.zeros((nb, 6, na)), np.zeros((5, na)), np.zeros(3), np.zeros((na, na)), np.zeros((6, na)),
         np.zeros((3, 3, 3)),
     )  # fmt: skip
@@ -239,22 +237,20 @@ def _forces(kin, masses, xpos, xquat, v, a, per_rate, lines, frames, mass, bias)
 @borrowing
 def _evaluate(mechanism, masses, w, r, qpos, tangent, velocity):  # type: ignore[no-untyped-def]
     """Fill M, h and the accelerations that the loops carry, for *velocity* ``(na,)`` where `close_one` was last."""
-    kin, seen, passive = mechanism.kinematics, w.seen, mechanism.passive
+    kin, seen = mechanism.kinematics, w.seen
     na, nv = velocity.shape[0], r.carried.shape[0]
     follow_tangent(tangent, velocity, r.qvel)
     for d in range(nv):
         r.carried[d] = 0.0
     _motions(kin, w.places.cdof, r.qvel, r.carried, tangent, r.v, r.a, r.per_rate)
-    if passive.shape[0]:
+    if mechanism.passive.shape[0]:
         acceleration_rows(
             mechanism.closures, mechanism.joints, qpos, kin.centre, seen.site_xpos, seen.anchors, r.qvel, r.carried,
             r.v, r.a, r.rates,
         )  # fmt: skip
         for i in range(r.rates.shape[0]):
             r.rates[i] = -r.rates[i]
-        solve(w.a, w.beta, w.order, np.int64(w.facts[1]), r.rates, r.x)
-        for j in range(passive.shape[0]):
-            r.carried[passive[j]] = r.x[j]
+        solve_again(mechanism, w, r.rates, r.carried)
         _add_accelerations(kin, w.places.cdof, r.carried, r.more, r.a)
     for k in range(na):
         r.bias[k] = 0.0

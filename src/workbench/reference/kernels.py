@@ -1,4 +1,4 @@
-"""Compiled arithmetic of the reference over a block of samples: closure steps, projection, joint reactions.
+"""Compiled arithmetic of the reference over a block of samples: closure steps.
 
 All kinematics, inertia and bias terms come from MuJoCo; what stands here is the algebra of the closed loops.
 """
@@ -6,21 +6,13 @@ All kinematics, inertia and bias terms come from MuJoCo; what stands here is the
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from workbench.arrays import FloatArray
 from workbench.compiled import borrowing, compiled, inlined
-from workbench.reference.kinds import BALL, CONNECT, FREE, WELD
-from workbench.reference.linear import Lengths, factor, room_to_factor, solve, solve_beside, solve_transposed
-from workbench.reference.rows import (
-    acceleration_rows,
-    body_accelerations,
-    body_velocities,
-    constraint_rows,
-    point_motion,
-)
+from workbench.reference.kinds import BALL, FREE
+from workbench.reference.linear import Elimination, factor, solve
+from workbench.reference.rows import constraint_rows
 from workbench.reference.sides import UNKNOWN, side_of
 
 
@@ -126,7 +118,7 @@ def newton_step(  # type: ignore[no-untyped-def]
     m, nv, p, na = closures.block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
     jac, res, rhs = np.empty((m, nv)), np.empty(m), np.empty(m)
     a, beta, perm, lengths = room
-    step, work, x = np.zeros(nv), np.empty((p, p)), np.empty(p)
+    step, work, x = np.zeros(nv), Elimination(np.empty((p, p)), np.empty(p, dtype=np.int64)), np.empty(p)
     active = np.empty_like(ids)
     more = 0
     for n in range(ids.shape[0]):
@@ -166,202 +158,3 @@ def newton_step(  # type: ignore[no-untyped-def]
             active[more] = s
             more += 1
     return active[:more]
-
-
-class ProjectionRoom(NamedTuple):
-    """Room for the work of `projection` on one sample."""
-
-    jacobian: FloatArray
-    residual: FloatArray
-    rates: FloatArray
-    a: FloatArray
-    beta: FloatArray
-    order: np.ndarray
-    lengths: Lengths
-    force: FloatArray
-    passive_force: FloatArray
-    multipliers: FloatArray
-    velocity: FloatArray
-    """``(nbody, 6)`` spatial, as `acceleration`"""
-    acceleration: FloatArray
-    carried: FloatArray
-    """``(nbody, 3)`` forces"""
-
-
-def projection_room(rows: int, freedoms: int, passive: int, bodies: int) -> ProjectionRoom:
-    """Room for a model of so many constraint rows, velocities, passive velocities and bodies."""
-    m, nv, p, nb = rows, freedoms, passive, bodies
-    return ProjectionRoom(
-        np.empty((m, nv)), np.empty(m), np.empty(m), *room_to_factor(m, p, 1), np.empty(nv), np.empty(p), np.empty(m),
-        np.empty((nb, 6)), np.empty((nb, 6)), np.empty((nb, 3)),
-    )  # fmt: skip
-
-
-@borrowing
-def projection(  # type: ignore[no-untyped-def]
-    closures, joints, split, bodies, poses, dynamics, mass_layout, platform, masses, gravity, base_rotation,
-    base_position, qpos, qvel, tangent, qdd, applied, qacc, tau, closure_residual, velocity_residual,
-    acceleration_residual, motion, turning, reactions, slack, first, room,
-):  # fmt: skip
-    """Accelerations, actuator torques, platform motion and reaction forces of a block.
-
-    With W the tangent (J W = 0), tau = W^T (M qacc + bias - applied): the constraint forces do no work along W. Their
-    least-norm values come from the same factor as qacc and are the loop reactions. ``mass`` holds M's lower triangle.
-    ``motion (3, n, 3)`` receives x, xd, xdd; ``turning``, three arrays, the platform site's rotation ``(n, 3, 3)``, its
-    angular velocity and acceleration ``(n, 3)``; ``reactions (loops + joints, n, 3)`` forces; all in the base's frame.
-    ``gravity (nbody, 3)`` is what pulls each body. ``slack (n, na)``, or empty, receives what the rows' disagreement is
-    worth: the power, per actuated velocity, of least-norm multipliers along ``J W``, which is zero in loops that close.
-    """
-    cdof, com, site_xpos, site_xquat, anchors = poses
-    cdof_dot, mass, bias, damping, body_com = dynamics
-    mass_row, mass_col = mass_layout
-    passive, actuated = split
-    body, site = platform
-    blocks, block_rows = closures.blocks, closures.block_rows
-    root, moving, depth = closures.root, closures.moving, closures.depth
-    m, nv, p, na = block_rows[-1], cdof.shape[1], passive.shape[0], actuated.shape[0]
-    jac, res, rates = room.jacobian, room.residual, room.rates
-    a, beta, perm, lengths = room.a, room.beta, room.order, room.lengths
-    force, passive_force, multipliers = room.force, room.passive_force, room.multipliers
-    v, acc, carried = room.velocity, room.acceleration, room.carried
-    for s in range(qpos.shape[0]):
-        constraint_rows(closures, joints, qpos[s], cdof[s], com[s], site_xpos[s], site_xquat[s], anchors[s], jac, res)
-        worst, open_by = 0.0, 0.0
-        for i in range(m):
-            value = 0.0
-            for d in range(nv):
-                value += jac[i, d] * qvel[s, d]
-            # a maximum passes over what is no number
-            worst = math.inf if math.isnan(value) else max(worst, abs(value))
-            open_by = math.inf if math.isnan(res[i]) else max(open_by, abs(res[i]))
-        closure_residual[s], velocity_residual[s] = open_by, worst
-        follow_tangent(tangent[s], qdd[s], qacc[s])
-        body_velocities(bodies, cdof[s], qvel[s], v)
-        body_accelerations(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], acc)
-        acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
-        for i in range(m):
-            a[i, p] = -rates[i]
-            for j in range(p):
-                a[i, j] = jac[i, passive[j]]
-        rank = factor(a, beta, perm, lengths)
-        solve_beside(a, p, rank)
-        for k in range(p):
-            qacc[s, passive[perm[k]]] += a[k, p]
-        body_accelerations(bodies, cdof[s], cdof_dot[s], qvel[s], qacc[s], acc)
-        acceleration_rows(closures, joints, qpos[s], com[s], site_xpos[s], anchors[s], qvel[s], qacc[s], v, acc, rates)
-        worst = 0.0
-        for i in range(m):
-            worst = math.inf if math.isnan(rates[i]) else max(worst, abs(rates[i]))
-        acceleration_residual[s] = worst
-        # generalized force of the motion
-        for d in range(nv):
-            force[d] = bias[s, d] - damping[s, d]
-        for e in range(mass.shape[1]):
-            i, j = mass_row[e], mass_col[e]
-            force[i] += mass[s, e] * qacc[s, j]
-            if i != j:
-                force[j] += mass[s, e] * qacc[s, i]
-        _subtract_applied(cdof[s], com[s, root[body]], site_xpos[s, site], moving, depth[body], body, applied[s], force)
-        # J_passive^T lambda = force at the passive freedoms; the rest of the balance is at the actuators
-        for j in range(p):
-            passive_force[j] = force[passive[j]]
-        solve_transposed(a, beta, perm, rank, passive_force, multipliers)
-        for j in range(na):
-            value = force[actuated[j]]
-            for i in range(m):
-                value -= jac[i, actuated[j]] * multipliers[i]
-            tau[s, j] = value
-        if slack.shape[0]:
-            for j in range(na):
-                slack[s, j] = 0.0
-            for i in range(m):
-                for j in range(na):
-                    value = 0.0
-                    for d in range(nv):
-                        value += jac[i, d] * tangent[s, d, j]
-                    slack[s, j] += abs(multipliers[i] * value)
-        px, py, pz = site_xpos[s, site, 0], site_xpos[s, site, 1], site_xpos[s, site, 2]
-        vx, vy, vz, ax, ay, az = point_motion(v[body], acc[body], com[s, root[body]], site_xpos[s, site])
-        px, py, pz = px - base_position[0], py - base_position[1], pz - base_position[2]
-        for k in range(3):
-            rx, ry, rz = base_rotation[0, k], base_rotation[1, k], base_rotation[2, k]
-            motion[0, first + s, k] = px * rx + py * ry + pz * rz
-            motion[1, first + s, k] = vx * rx + vy * ry + vz * rz
-            motion[2, first + s, k] = ax * rx + ay * ry + az * rz
-        _turning(base_rotation, site_xquat[s, site], v[body], acc[body], turning, s)
-        _reactions(
-            blocks, block_rows, bodies, masses, gravity, base_rotation, body, com[s], body_com[s], v, acc, multipliers,
-            applied[s], carried, reactions, first + s,
-        )  # fmt: skip
-
-
-@inlined
-def _turning(base_rotation, quaternion, v, acc, turning, s):  # type: ignore[no-untyped-def]
-    """Rotation, angular velocity and angular acceleration of a site (unit quaternion, world) in the base's frame."""
-    rotation, omega, alpha = turning
-    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-    for k in range(3):
-        rx, ry, rz = base_rotation[0, k], base_rotation[1, k], base_rotation[2, k]
-        rotation[s, k, 0] = rx * (1.0 - 2.0 * (y * y + z * z)) + ry * 2.0 * (x * y + w * z) + rz * 2.0 * (x * z - w * y)
-        rotation[s, k, 1] = rx * 2.0 * (x * y - w * z) + ry * (1.0 - 2.0 * (x * x + z * z)) + rz * 2.0 * (y * z + w * x)
-        rotation[s, k, 2] = rx * 2.0 * (x * z + w * y) + ry * 2.0 * (y * z - w * x) + rz * (1.0 - 2.0 * (x * x + y * y))
-        omega[s, k] = v[0] * rx + v[1] * ry + v[2] * rz
-        alpha[s, k] = acc[0] * rx + acc[1] * ry + acc[2] * rz
-
-
-@inlined
-def _subtract_applied(cdof, com, point, moving, depth, body, applied, force):  # type: ignore[no-untyped-def]
-    """Take off the generalized force ``(nv,)`` of an external force at a point of a body."""
-    rx, ry, rz = point[0] - com[0], point[1] - com[1], point[2] - com[2]
-    for k in range(depth):
-        d = moving[body, k]
-        wx, wy, wz = cdof[d, 0], cdof[d, 1], cdof[d, 2]
-        force[d] -= (
-            applied[0] * (cdof[d, 3] + wy * rz - wz * ry)
-            + applied[1] * (cdof[d, 4] + wz * rx - wx * rz)
-            + applied[2] * (cdof[d, 5] + wx * ry - wy * rx)
-        )
-
-
-@inlined
-def _reactions(  # type: ignore[no-untyped-def]
-    blocks, block_rows, bodies, masses, gravity, base_rotation, platform, com, body_com, v, acc, multipliers, applied,
-    carried, reactions, s,
-):  # fmt: skip
-    """Forces at the loop closures, then through each body's joints, from Newton's law of everything beyond them."""
-    parent, root, _first, _number = bodies
-    for b in range(parent.shape[0]):
-        _, _, _, ax, ay, az = point_motion(v[b], acc[b], com[root[b]], body_com[b])
-        carried[b, 0] = masses[b] * (ax - gravity[b, 0])
-        carried[b, 1] = masses[b] * (ay - gravity[b, 1])
-        carried[b, 2] = masses[b] * (az - gravity[b, 2])
-    for i in range(3):
-        carried[platform, i] -= applied[i]
-    loops = 0
-    for k in range(blocks.shape[0]):
-        if not is_site_closure(blocks, k):
-            continue
-        for i in range(3):
-            force = multipliers[block_rows[k] + i]
-            carried[blocks[k, 1], i] -= force
-            carried[blocks[k, 2], i] += force
-        for i in range(3):
-            value = 0.0
-            for j in range(3):
-                value += multipliers[block_rows[k] + j] * base_rotation[j, i]
-            reactions[loops, s, i] = value
-        loops += 1
-    for b in range(parent.shape[0] - 1, 0, -1):
-        for i in range(3):
-            carried[parent[b], i] += carried[b, i]
-        for i in range(3):
-            value = 0.0
-            for j in range(3):
-                value += carried[b, j] * base_rotation[j, i]
-            reactions[loops + b - 1, s, i] = value
-
-
-@inlined
-def is_site_closure(blocks, k):  # type: ignore[no-untyped-def]
-    """Whether a block joins two places of bodies, and so carries a force that is reported."""
-    return blocks[k, 0] in (CONNECT, WELD)

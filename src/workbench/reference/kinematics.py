@@ -152,6 +152,15 @@ def _times(one, w, x, y, z, out):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def _turn_on(one, other, out):  # type: ignore[no-untyped-def]
+    """Quaternion product of *one* and *other* into *out*; most are no turn at all."""
+    if other[0] == 1.0 and other[1] == 0.0 and other[2] == 0.0 and other[3] == 0.0:
+        out[0], out[1], out[2], out[3] = one[0], one[1], one[2], one[3]
+    else:
+        _times(one, other[0], other[1], other[2], other[3], out)
+
+
+@inlined
 def _turning(cdof, row, ax, ay, az, rx, ry, rz):  # type: ignore[no-untyped-def]
     """Motion vector of a turn about an axis through a point; r leads from the point to the centre."""
     cdof[row, 0], cdof[row, 1], cdof[row, 2] = ax, ay, az
@@ -175,8 +184,7 @@ def place(kin, qpos, places):  # type: ignore[no-untyped-def]
         p, here, turn = kin.parent[b], xpos[b], xquat[b]
         x, y, z = _turned(xquat[p], kin.body_pos[b])
         here[0], here[1], here[2] = xpos[p, 0] + x, xpos[p, 1] + y, xpos[p, 2] + z
-        q = kin.body_quat[b]
-        _times(xquat[p], q[0], q[1], q[2], q[3], turn)
+        _turn_on(xquat[p], kin.body_quat[b], turn)
         turned = False
         for j in range(kin.first[b], kin.first[b] + kin.number[b]):
             kind, a, d = kin.kind[j], kin.qpos_of[j], kin.dof_of[j]
@@ -187,8 +195,12 @@ def place(kin, qpos, places):  # type: ignore[no-untyped-def]
                 for i in range(4):
                     turn[i] = qpos[a + 3 + i] / n
                 continue
-            x, y, z = _turned(turn, kin.joint_pos[j])
-            cx, cy, cz = here[0] + x, here[1] + y, here[2] + z
+            # most joints are at the origin of their body
+            shifted = kin.joint_pos[j, 0] != 0.0 or kin.joint_pos[j, 1] != 0.0 or kin.joint_pos[j, 2] != 0.0
+            cx, cy, cz = here[0], here[1], here[2]
+            if shifted:
+                x, y, z = _turned(turn, kin.joint_pos[j])
+                cx, cy, cz = cx + x, cy + y, cz + z
             anchors[j, 0], anchors[j, 1], anchors[j, 2] = cx, cy, cz
             if kind == TURNING:
                 n = 1.0 / math.sqrt(qpos[a] ** 2 + qpos[a + 1] ** 2 + qpos[a + 2] ** 2 + qpos[a + 3] ** 2)
@@ -204,8 +216,9 @@ def place(kin, qpos, places):  # type: ignore[no-untyped-def]
                 s, c = math.sin(0.5 * move), math.cos(0.5 * move)
                 _times(turn, c, s * u[0], s * u[1], s * u[2], turn)
             turned = True
-            x, y, z = _turned(turn, kin.joint_pos[j])
-            here[0], here[1], here[2] = cx - x, cy - y, cz - z
+            if shifted:
+                x, y, z = _turned(turn, kin.joint_pos[j])
+                here[0], here[1], here[2] = cx - x, cy - y, cz - z
         if turned:
             n = 1.0 / math.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2 + turn[3] ** 2)
             for i in range(4):
@@ -233,5 +246,4 @@ def place(kin, qpos, places):  # type: ignore[no-untyped-def]
         x, y, z = _turned(xquat[b], kin.point_pos[k])
         out = places.site_xpos[site]
         out[0], out[1], out[2] = xpos[b, 0] + x, xpos[b, 1] + y, xpos[b, 2] + z
-        q = kin.point_quat[k]
-        _times(xquat[b], q[0], q[1], q[2], q[3], places.site_xquat[site])
+        _turn_on(xquat[b], kin.point_quat[k], places.site_xquat[site])

@@ -45,9 +45,13 @@ def room_to_factor(rows: int, columns: int, beside: int = 0) -> tuple[FloatArray
     """
     high = max(rows, columns)
     return (
-        np.zeros((high, columns + beside + SPARE)), np.zeros(columns), np.zeros(columns, dtype=np.int64),
-        Lengths(np.zeros(columns), np.zeros(columns), np.zeros(high, dtype=np.int64)),
+        np.zeros((high, columns + beside + SPARE)), np.zeros(columns), np.zeros(columns, dtype=np.uint64),
+        Lengths(np.zeros(columns), np.zeros(columns), np.zeros(high, dtype=np.uint64)),
     )  # fmt: skip
+
+
+ONE, TWO, THREE, FOUR = (np.uint64(n) for n in range(1, 5))
+"""Counts of what is never negative: of another index a kernel looks first whether it is meant from the end."""
 
 
 @borrowing
@@ -58,7 +62,7 @@ def factor(a, beta, perm, lengths):  # type: ignore[no-untyped-def]
     order. Between these columns and `SPARE` of zeros may stand right-hand sides b, which become Q^T b, for
     `solve_beside`. Rows in which a column is zero cost nothing: loops that do not act on each other leave many.
     """
-    m, p, width = a.shape[0], perm.shape[0], a.shape[1] - SPARE
+    m, p, width = np.uint64(a.shape[0]), np.uint64(perm.shape[0]), np.uint64(a.shape[1] - SPARE)
     left, known, rows = lengths.left, lengths.known, lengths.rows
     for j in range(p):
         perm[j] = j
@@ -82,15 +86,14 @@ def factor(a, beta, perm, lengths):  # type: ignore[no-untyped-def]
             perm[k], perm[pivot] = perm[pivot], perm[k]
             left[pivot], known[pivot] = left[k], known[k]
         head = a[k, k]
-        best, count = head * head, 0
-        for i in range(k + 1, m):
+        best, count = head * head, np.uint64(0)
+        for i in range(k + ONE, m):
             v = a[i, k]
             rows[count] = i
-            if v != 0.0:
-                best += v * v
-                count += 1
+            best += v * v
+            count += np.uint64(v != 0.0)
         norm = math.sqrt(best)
-        if k == 0:
+        if rank == 0:
             first = norm
         if not norm > RANK_TOLERANCE * first:
             for j in range(k, p):
@@ -105,32 +108,32 @@ def factor(a, beta, perm, lengths):  # type: ignore[no-untyped-def]
         a[k, k] = alpha
         for n in range(count):
             a[rows[n], k] *= scale
-        for j in range(k + 1, width, 4):
-            s0, s1, s2, s3 = a[k, j], a[k, j + 1], a[k, j + 2], a[k, j + 3]
+        for j in range(k + ONE, width, FOUR):
+            s0, s1, s2, s3 = a[k, j], a[k, j + ONE], a[k, j + TWO], a[k, j + THREE]
             for n in range(count):
                 i = rows[n]
                 v = a[i, k]
                 s0 += v * a[i, j]
-                s1 += v * a[i, j + 1]
-                s2 += v * a[i, j + 2]
-                s3 += v * a[i, j + 3]
+                s1 += v * a[i, j + ONE]
+                s2 += v * a[i, j + TWO]
+                s3 += v * a[i, j + THREE]
             s0, s1, s2, s3 = turn * s0, turn * s1, turn * s2, turn * s3
-            a[k, j], a[k, j + 1], a[k, j + 2], a[k, j + 3] = (
-                a[k, j] - s0, a[k, j + 1] - s1, a[k, j + 2] - s2, a[k, j + 3] - s3
+            a[k, j], a[k, j + ONE], a[k, j + TWO], a[k, j + THREE] = (
+                a[k, j] - s0, a[k, j + ONE] - s1, a[k, j + TWO] - s2, a[k, j + THREE] - s3
             )  # fmt: skip
             for n in range(count):
                 i = rows[n]
                 v = a[i, k]
-                # all four are read before the first is written, so that they are one vector
-                a[i, j], a[i, j + 1], a[i, j + 2], a[i, j + 3] = (
-                    a[i, j] - s0 * v, a[i, j + 1] - s1 * v, a[i, j + 2] - s2 * v, a[i, j + 3] - s3 * v
+                # all four are read before the first is written, so that none has to wait for another
+                a[i, j], a[i, j + ONE], a[i, j + TWO], a[i, j + THREE] = (
+                    a[i, j] - s0 * v, a[i, j + ONE] - s1 * v, a[i, j + TWO] - s2 * v, a[i, j + THREE] - s3 * v
                 )  # fmt: skip
         # what is left of a column's length: taken off, and looked at again where that would lose digits
-        for j in range(k + 1, p):
+        for j in range(k + ONE, p):
             left[j] -= a[k, j] * a[k, j]
             if not left[j] > DIGITS_LEFT * known[j]:
                 left[j] = 0.0
-                for i in range(k + 1, m):
+                for i in range(k + ONE, m):
                     left[j] += a[i, j] * a[i, j]
                 known[j] = left[j]
     return rank
@@ -142,20 +145,87 @@ def solve_beside(a, p, rank):  # type: ignore[no-untyped-def]
 
     Row k becomes the solution's entry ``perm[k]``, for k < p; entries beyond the rank are zero.
     """
-    for k in range(rank, p):
+    for row in range(rank, p):
         for j in range(p, a.shape[1]):
-            a[k, j] = 0.0
-    for j in range(p, a.shape[1] - SPARE, 4):
-        for k in range(rank - 1, -1, -1):
-            s0, s1, s2, s3 = a[k, j], a[k, j + 1], a[k, j + 2], a[k, j + 3]
-            for i in range(k + 1, rank):
+            a[row, j] = 0.0
+    high = np.uint64(rank)
+    for j in range(np.uint64(p), np.uint64(a.shape[1] - SPARE), FOUR):
+        for n in range(high):
+            k = high - ONE - n
+            s0, s1, s2, s3 = a[k, j], a[k, j + ONE], a[k, j + TWO], a[k, j + THREE]
+            for i in range(k + ONE, high):
                 v = a[k, i]
                 s0 -= v * a[i, j]
-                s1 -= v * a[i, j + 1]
-                s2 -= v * a[i, j + 2]
-                s3 -= v * a[i, j + 3]
+                s1 -= v * a[i, j + ONE]
+                s2 -= v * a[i, j + TWO]
+                s3 -= v * a[i, j + THREE]
             v = a[k, k]
-            a[k, j], a[k, j + 1], a[k, j + 2], a[k, j + 3] = s0 / v, s1 / v, s2 / v, s3 / v
+            a[k, j], a[k, j + ONE], a[k, j + TWO], a[k, j + THREE] = s0 / v, s1 / v, s2 / v, s3 / v
+
+
+class Elimination(NamedTuple):
+    """Room for `eliminate`."""
+
+    a: FloatArray
+    """``(p, columns)``"""
+    swaps: np.ndarray
+    """``(p,)`` with which row each was exchanged"""
+
+
+def room_to_eliminate(rows: int, beside: int = 0) -> Elimination:
+    """A square matrix with *beside* right-hand sides, for `solve_beside`."""
+    return Elimination(np.zeros((rows, rows + beside + SPARE)), np.zeros(rows, dtype=np.int64))
+
+
+@borrowing
+def eliminate(room, first, end, high, width, mean):  # type: ignore[no-untyped-def]
+    """Eliminate columns *first* to *end* - 1, pivots from the same rows, up to row *high* and column *width*.
+
+    Multipliers take the place of what is eliminated. Returns the determinant of these rows and columns: its sign
+    (whether it is negative), and its size over ``mean^(end - first)``, which is -1 for zero; then nothing else holds.
+    """
+    a, swaps = room.a, room.swaps
+    negative, volume = False, 1.0
+    last, low, wide = np.uint64(end), np.uint64(high), np.uint64(width)
+    for k in range(np.uint64(first), last):
+        pivot = k
+        for i in range(k + ONE, last):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        swaps[k] = pivot
+        if pivot != k:
+            negative = not negative
+            for j in range(wide):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        head = a[k, k]
+        if not abs(head) > 0.0:
+            return False, -1.0
+        negative ^= head < 0.0
+        volume *= abs(head) / mean
+        for i in range(k + ONE, low):
+            scale = a[i, k] / head
+            if scale != 0.0:
+                a[i, k] = scale
+                for j in range(k + ONE, wide):
+                    a[i, j] -= scale * a[k, j]
+    return negative, volume
+
+
+@borrowing
+def solve_eliminated(room, x):  # type: ignore[no-untyped-def]
+    """Solve for one more right-hand side ``(p,)``, which the solution takes the place of."""
+    a, swaps = room.a, room.swaps
+    p = x.shape[0]
+    for k in range(p):
+        x[k], x[swaps[k]] = x[swaps[k]], x[k]
+    for i in range(p):
+        for k in range(i):
+            x[i] -= a[i, k] * x[k]
+    for i in range(p - 1, -1, -1):
+        s = x[i]
+        for k in range(i + 1, p):
+            s -= a[i, k] * x[k]
+        x[i] = s / a[i, i]
 
 
 @borrowing
@@ -189,20 +259,23 @@ def solve(a, beta, perm, rank, rhs, x):  # type: ignore[no-untyped-def]
 @borrowing
 def solve_transposed(a, beta, perm, rank, rhs, y):  # type: ignore[no-untyped-def]
     """Least-norm ``y (m,)`` with A^T y = rhs ``(p,)``."""
-    m = y.shape[0]
-    for i in range(m):
-        y[i] = rhs[perm[i]] if i < rank else 0.0
-    for i in range(rank):
+    m, r = np.uint64(y.shape[0]), np.uint64(rank)
+    for i in range(r):
+        y[i] = rhs[perm[i]]
+    for i in range(r, m):
+        y[i] = 0.0
+    for i in range(r):
         y[i] /= a[i, i]
-        for k in range(i + 1, rank):
-            y[k] -= a[i, k] * y[i]
-    for k in range(rank - 1, -1, -1):
+        for j in range(i + ONE, r):
+            y[j] -= a[i, j] * y[i]
+    for n in range(r):
+        k = r - ONE - n
         s = y[k]
-        for i in range(k + 1, m):
+        for i in range(k + ONE, m):
             s += a[i, k] * y[i]
         s *= beta[k]
         y[k] -= s
-        for i in range(k + 1, m):
+        for i in range(k + ONE, m):
             y[i] -= s * a[i, k]
 
 

@@ -25,9 +25,10 @@ from workbench.reference.closure import LoopCloser
 from workbench.reference.continuation import Assembly
 from workbench.reference.engine import Engine, Evaluator, mass_layout, without_bar_inertia
 from workbench.reference.freedoms import check_freedoms, refuse_locked
-from workbench.reference.kernels import projection, projection_room, velocities
+from workbench.reference.kernels import velocities
 from workbench.reference.platform_closure import PlatformCloser
 from workbench.reference.platform_side import PlatformSide
+from workbench.reference.projection import projection, projection_room
 from workbench.reference.reactions import named, reaction_rows
 from workbench.reference.redundant import excess_actuators, leading, shared
 from workbench.reference.result import Mobility, ReferenceResult, refuse_overflow
@@ -257,11 +258,11 @@ class MujocoReference(PlatformSide):
         qpos, (qvel, qacc) = assembly.qpos, np.zeros((2, n, model.nv))
         tau, motion, energy = np.zeros_like(q), np.zeros((3, n, 3)), np.zeros((n, 2))
         turning = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
-        closure_residual, velocity_residual, acceleration_residual = np.zeros((3, n))
+        closure_residual, velocity_residual, acceleration_residual, condition = np.zeros((4, n))
+        (rank, weakest), site = np.zeros((2, n), dtype=np.int64), structure.platform_site
         # the kernel fills a row for every body, also for fixed ones that follow the last joint
         reactions = np.zeros((len(structure.blocks) + model.nbody, n, 3))
         velocities(assembly.tangent, qd, qvel)
-        site = structure.platform_site
         platform = int(model.site_bodyid[site]), site
         masses, gravity = np.array(model.body_mass), felt_gravity(model)
         few_digits = self._closer.tolerance.few_digits
@@ -278,15 +279,16 @@ class MujocoReference(PlatformSide):
                 *self._tables, poses.tables, dynamics.tables, self._mass_layout, platform, masses, gravity,
                 self._base_rotation, self._base_position, qpos[rows], qvel[rows], assembly.tangent[rows], qdd[rows],
                 force[rows], qacc[rows], tau[rows], closure_residual[rows], velocity_residual[rows],
-                acceleration_residual[rows], motion, tuple(array[rows] for array in turning), reactions, slack[rows],
-                rows.start, projection_room(structure.rows, model.nv, len(structure.passive), model.nbody),
+                acceleration_residual[rows], rank[rows], condition[rows], weakest[rows], motion,
+                tuple(array[rows] for array in turning), reactions, slack[rows], rows.start,
+                projection_room(structure.rows, model.nv, len(structure.passive), model.nbody, rows.stop - rows.start),
             )  # fmt: skip
             energy[rows] = dynamics.energy[: rows.stop - rows.start]
 
         engine.in_blocks(block, n)
         # beyond this rate MuJoCo sets the state back; such samples are refused for their rates
         self._closer.confirm(np.where(np.abs(qvel).max(axis=1) < mujoco.mjMAXVAL, closure_residual, 0.0))
-        self._refuse_singular(q, qd, assembly.rank, velocity_residual, assembly.weakest)
+        self._refuse_singular(q, qd, rank, velocity_residual, weakest)
         refuse_overflow("torques", tau, qd)
         if times is not None:
             refuse_jumps(times, structure, self._closer.joints, qpos, qvel, qacc)
@@ -294,12 +296,10 @@ class MujocoReference(PlatformSide):
         tau += friction.actuated * direction(qd)
         known = {} if acts_on_bodies(model) else named(self._reaction_rows, reactions)
         return ReferenceResult(
-            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], rotation=turning[0], omega=turning[1],
-            alpha=turning[2], reactions=known,
-            closure_residual=closure_residual, velocity_residual=velocity_residual,
-            acceleration_residual=acceleration_residual, rank=assembly.rank.copy(),
-            condition=assembly.condition.copy(), energy=energy, qpos=qpos.copy(), qvel=qvel, qacc=qacc,
-            slack=slack if few_digits else np.zeros_like(tau),
+            tau=tau, x=motion[0], xd=motion[1], xdd=motion[2], rotation=turning[0], omega=turning[1], alpha=turning[2],
+            reactions=known, closure_residual=closure_residual, velocity_residual=velocity_residual,
+            acceleration_residual=acceleration_residual, rank=rank, condition=condition, energy=energy,
+            qpos=qpos.copy(), qvel=qvel, qacc=qacc, slack=slack if few_digits else np.zeros_like(tau),
         )  # fmt: skip
 
     def _no_samples(self, mass_model: str) -> ReferenceResult:

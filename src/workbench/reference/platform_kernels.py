@@ -12,7 +12,7 @@ import numpy as np
 
 from workbench.compiled import compiled
 from workbench.reference.kernels import integrate, keep_if_better
-from workbench.reference.linear import factor, solve
+from workbench.reference.linear import Elimination, factor, solve
 from workbench.reference.rows import acceleration_rows, body_accelerations, body_velocities, constraint_rows
 from workbench.reference.sides import UNKNOWN, side_of
 from workbench.reference.task_rows import task_acceleration, task_rows
@@ -36,7 +36,7 @@ def platform_newton(  # type: ignore[no-untyped-def]
     values, rise, still = np.empty(given), np.empty(given), np.zeros(3)
     x = np.empty(nv)
     a, beta, perm, lengths = room
-    work = np.empty((nv, nv))
+    work = Elimination(np.empty((nv, nv)), np.empty(nv, dtype=np.int64))
     active = np.empty_like(ids)
     more = 0
     for n in range(ids.shape[0]):

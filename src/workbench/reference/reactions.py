@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 
 from workbench.arrays import FloatArray
-from workbench.reference.kernels import is_site_closure
+from workbench.reference.projection import is_site_closure
 from workbench.reference.structure import Structure
 
 

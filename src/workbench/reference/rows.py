@@ -6,6 +6,8 @@ mass of the kinematic tree.
 
 from __future__ import annotations
 
+import numpy as np
+
 from workbench.compiled import borrowing, inlined
 from workbench.reference.kinds import CONNECT, JOINT, SPIN, TENDON, WELD
 
@@ -14,21 +16,24 @@ from workbench.reference.kinds import CONNECT, JOINT, SPIN, TENDON, WELD
 def point_rows(cdof, com, moving, depth, body, point, sign, row, jac):  # type: ignore[no-untyped-def]
     """Add sign times the translational Jacobian ``(3, nv)`` of a body's point to rows row..row+2."""
     rx, ry, rz = point[0] - com[0], point[1] - com[1], point[2] - com[2]
+    one, two, three = np.uint64(row), np.uint64(row + 1), np.uint64(row + 2)
     for k in range(depth[body]):
-        d = moving[body, k]
+        d = np.uint64(moving[body, k])
         wx, wy, wz = cdof[d, 0], cdof[d, 1], cdof[d, 2]
-        jac[row, d] += sign * (cdof[d, 3] + wy * rz - wz * ry)
-        jac[row + 1, d] += sign * (cdof[d, 4] + wz * rx - wx * rz)
-        jac[row + 2, d] += sign * (cdof[d, 5] + wx * ry - wy * rx)
+        jac[one, d] += sign * (cdof[d, 3] + wy * rz - wz * ry)
+        jac[two, d] += sign * (cdof[d, 4] + wz * rx - wx * rz)
+        jac[three, d] += sign * (cdof[d, 5] + wx * ry - wy * rx)
 
 
 @inlined
 def _turn_rows(cdof, moving, depth, body, sign, row, jac):  # type: ignore[no-untyped-def]
     """Add sign times the rotational Jacobian ``(3, nv)`` of a body to rows row..row+2."""
+    one, two, three = np.uint64(row), np.uint64(row + 1), np.uint64(row + 2)
     for k in range(depth[body]):
-        d = moving[body, k]
-        for i in range(3):
-            jac[row + i, d] += sign * cdof[d, i]
+        d = np.uint64(moving[body, k])
+        jac[one, d] += sign * cdof[d, 0]
+        jac[two, d] += sign * cdof[d, 1]
+        jac[three, d] += sign * cdof[d, 2]
 
 
 @inlined

@@ -11,15 +11,16 @@ are no good measure, the two Jacobians themselves are compared.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from workbench.arrays import FloatArray
-from workbench.compiled import borrowing, inlined
+from workbench.compiled import borrowing
 from workbench.reference.kinds import CONNECT, JOINT, SPIN, TENDON, WELD
-from workbench.reference.linear import factor, room_to_factor
+from workbench.reference.linear import eliminate, factor, room_to_eliminate, room_to_factor
 from workbench.reference.structure import IntArray, Structure
 
 UNKNOWN = -1
@@ -58,61 +59,46 @@ NO_SIDES = SideTable(
 """Nothing is looked at: every configuration is on side 0."""
 
 
-@inlined
-def _eliminate(a, p, mean):  # type: ignore[no-untyped-def]
-    """Sign (whether it is negative) and size over ``mean^p``, -1 for zero, of a determinant.
-
-    It is that of the first p rows and columns of ``a``, which are overwritten. They are no view of their own: of a
-    view the compiler does not know that rows are in one piece.
-    """
-    negative, volume = False, 1.0
-    for k in range(p):
-        pivot = k
-        for i in range(k + 1, p):
-            if abs(a[i, k]) > abs(a[pivot, k]):
-                pivot = i
-        if pivot != k:
-            negative = not negative
-            for j in range(k, p):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-        head = a[k, k]
-        if not abs(head) > 0.0:
-            return False, -1.0
-        negative ^= head < 0.0
-        volume *= abs(head) / mean
-        for i in range(k + 1, p):
-            scale = a[i, k] / head
-            if scale != 0.0:
-                for j in range(k + 1, p):
-                    a[i, j] -= scale * a[k, j]
-    return negative, volume
-
-
 @borrowing
-def side_of(jac, rank, table, work):  # type: ignore[no-untyped-def]
+def side_of(jac, rank, table, room):  # type: ignore[no-untyped-def]
     """Side of one sample: a bit for each block, set where its determinant is negative, or `UNKNOWN`.
 
-    ``jac (m, nv)`` are the rows, ``rank`` that of the columns that are solved for; ``work (p, p)`` is overwritten.
+    ``jac (m, nv)`` are the rows, ``rank`` that of the columns that are solved for; ``room`` is that of
+    `workbench.reference.linear.room_to_eliminate`.
     """
-    rows, columns, starts = table.rows, table.columns, table.starts
+    rows, columns = table.rows, table.columns
     if rank < rows.shape[0]:
         return UNKNOWN
-    side = 0
-    for block in range(starts.shape[0] - 1):
-        first, size = starts[block], starts[block + 1] - starts[block]
-        for i in range(size):
-            for j in range(size):
-                work[i, j] = jac[rows[first + i], columns[first + j]]
-        negative, volume = _eliminate(work, size, table.sizes[block])
-        if volume < table.least[block]:
-            return UNKNOWN
-        if negative:
-            side ^= 1 << (block % MOST_BITS)
-    return side
+    for i in range(rows.shape[0]):
+        for j in range(columns.shape[0]):
+            room.a[i, j] = jac[rows[i], columns[j]]
+    return eliminate_chosen(table, room, columns.shape[0])[0]
 
 
 @borrowing
-def same_side(before, after, table, work, same):  # type: ignore[no-untyped-def]
+def eliminate_chosen(table, room, width):  # type: ignore[no-untyped-def]
+    """Eliminate the chosen rows, which stand in *room* with all up to column *width*: side, and how good they are.
+
+    The latter is the least determinant of a block as a part of that at home. Entries outside of the blocks do not
+    change a block's pivots, however blocks follow each other: what leads from a block to others never leads back.
+    """
+    starts, side, poorest = table.starts, 0, math.inf
+    for block in range(starts.shape[0] - 1):
+        negative, volume = eliminate(
+            room, starts[block], starts[block + 1], table.rows.shape[0], width, table.sizes[block]
+        )
+        poorest = min(poorest, volume)
+        if volume < table.least[block]:
+            side = UNKNOWN
+        if volume < 0.0:
+            return UNKNOWN, volume
+        if negative and side != UNKNOWN:
+            side ^= 1 << (block % MOST_BITS)
+    return side, poorest
+
+
+@borrowing
+def same_side(before, after, table, room, same):  # type: ignore[no-untyped-def]
     """Fill ``same (k,)``: which of these rows ``(k, m, nv)`` of neighbours are turned over in no block.
 
     With ``A T = B`` in least squares, A a block before and B after, T is near one for near neighbours; its determinant
@@ -129,9 +115,9 @@ def same_side(before, after, table, work, same):  # type: ignore[no-untyped-def]
                     value = 0.0
                     for r in range(table.group_starts[block], table.group_starts[block + 1]):
                         value += before[s, rows[r], columns[first + i]] * after[s, rows[r], columns[first + j]]
-                    work[i, j] = value
+                    room.a[i, j] = value
                     mean = max(mean, abs(value))
-            negative, volume = _eliminate(work, size, mean)
+            negative, volume = eliminate(room, 0, size, size, size, mean)
             same[s] &= volume >= 0.0 and not negative
 
 
@@ -214,7 +200,7 @@ def side_at(jacobian: FloatArray, columns: IntArray, table: SideTable) -> int:
     a, *room = room_to_factor(len(jacobian), p)
     a[: len(jacobian), :p] = jacobian[:, columns]
     rank = factor(a, *room)
-    return int(side_of(jacobian, rank, table, np.empty((p, p))))
+    return int(side_of(jacobian, rank, table, room_to_eliminate(p)))
 
 
 def pattern_of(structure: Structure, dof_of: IntArray) -> tuple[np.ndarray, IntArray]:

@@ -147,7 +147,9 @@ class ClosedForm:
             A sample outside the workspace or at a singular pose; the message names sample and joint.
         """
         self._check_mass_model(mass_model)
-        q, qd, qdd = same_lengths(q=as_rows("q", q), qd=as_rows("qd", qd), qdd=as_rows("qdd", qdd))
+        q, qd, qdd = as_rows("q", q), as_rows("qd", qd), as_rows("qdd", qdd)
+        if not len(q) == len(qd) == len(qdd):  # looked at here: for one sample the call would cost as much as all above
+            same_lengths(q=q, qd=qd, qdd=qdd)
         force = NO_FORCE if external_force is None else as_force("external_force", external_force, len(q))
         tau: FloatArray = self.torques(q, qd, qdd, mass_model, force, threads)  # type: ignore[attr-defined]
         if self.has_friction:

@@ -76,7 +76,7 @@ def fill_torques(
     """
     _ready(kernel, 2)
     n = len(q)
-    workers = min(checked_threads(threads), n // SAMPLES_PER_THREAD)
+    workers = 1 if checked_threads(threads) == 1 else min(threads, n // SAMPLES_PER_THREAD)
     if workers <= 1:
         bad = kernel(constants, q, qd, qdd, force, tau)
     else:

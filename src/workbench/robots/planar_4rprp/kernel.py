@@ -125,6 +125,12 @@ def torques_sample(c, q1, q2, q3, qd1, qd2, qd3, qdd1, qdd2, qdd3, fx, fy, fz): 
 @compiled
 def torques_batch(c, q, qd, qdd, force, tau):  # type: ignore[no-untyped-def]
     """Fill tau ``(n, 3)``; returns how many samples have no finite torques, those outside the workspace among them."""
+    if q.shape[0] == 1:  # without a block, which takes longer to make and to touch than the sample
+        tau[0, 0], tau[0, 1], tau[0, 2] = torques_sample(
+            c, q[0, 0], q[0, 1], q[0, 2], qd[0, 0], qd[0, 1], qd[0, 2], qdd[0, 0], qdd[0, 1], qdd[0, 2],
+            force[0, 0], force[0, 1], force[0, 2],
+        )  # fmt: skip
+        return 0 if finite(tau[0, 0], tau[0, 1], tau[0, 2]) else 1
     block, bad = np.empty(COLUMNS * BLOCK), 0
     for first in range(0, q.shape[0], BLOCK):
         count = min(BLOCK, q.shape[0] - first)
