@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from own_mechanisms import FOURBAR
 from test_mjcf_setup import CUP, PLATFORM, floated, robot
 from workbench.campaign.run import run_campaign
 from workbench.cli import app
@@ -17,6 +19,7 @@ from workbench.importing.write import robot_text, write_folder
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference
 from workbench.reference.crossings import look, refuse_crossings, worth
+from workbench.reference.survey import _descended
 from workbench.robots.robot_file import read_robot_file
 
 MOTOR = '<actuator><motor joint="crank"/></actuator>'
@@ -191,3 +194,18 @@ def test_a_refusal_names_its_line(tmp_path: Path) -> None:
     assert f"line {line}: " in str(caught.value)
     assert len(caught.value.facts["refusals"]) == 2
     assert "\n" not in str(caught.value)
+
+
+def test_loops_are_closed_from_the_pose_that_is_asked_for() -> None:
+    """Not from where the last try has ended."""
+    model = mujoco.MjModel.from_xml_string(FOURBAR)
+    data, still = mujoco.MjData(model), np.zeros(model.nv, dtype=np.bool_)
+    still[0] = True
+    near = np.array([1.0, -0.5, -1.5])
+    up, _, open_by = _descended(model, data, near, still)
+    assert open_by < 1e-9
+    other, _, also = _descended(model, data, np.array([1.0, -3.0, 1.0]), still)
+    assert also < 1e-9
+    assert np.abs(other - up).max() > 0.3  # the other way to assemble it
+    again, _, _ = _descended(model, data, near, still)
+    assert np.array_equal(again, up)
