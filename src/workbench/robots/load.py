@@ -32,7 +32,7 @@ from workbench.robots.robot_file import RobotFile
 from workbench.robots.values import is_written, quotient, read_number, read_parameters, rewrite
 from workbench.robots.variants import Variants
 
-NAMES_FILES = re.compile(r"\bfile\s*=")
+NAMES_FILES = re.compile(r"file\s*=")
 """Of an include, a mesh, a picture, an attached model: a text with it may mean something else when it is read again."""
 
 
