@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 
@@ -10,7 +11,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from workbench.arrays import FloatArray
-from workbench.parquet_columns import column_bytes
+from workbench.parquet_columns import column_bytes, table_of
+from workbench.sweep.files import table_bytes
 
 COLUMNS: dict[str, FloatArray] = {
     "plain": np.array([0.1, -0.0, 5e-324, 1e38, np.inf, -np.inf, 2.0**53 + 1, 3.0, 4.0]),
@@ -42,3 +44,26 @@ def test_pandas_is_not_loaded() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
     assert done.stdout.strip() == "False"
+
+
+def test_tables_are_those_that_arrow_makes_by_itself() -> None:
+    columns = {
+        "text": ["a", None, "äöü €", "", "x" * 300],
+        "whole": [1, -(2**62), 0, 3, 4],
+        "number": [0.5, math.nan, None, math.inf, -0.0],
+        "left out": [1.0] * 5,
+    }
+    kinds = {"number": pa.float64(), "text": pa.string(), "whole": pa.int64()}
+    schema = pa.schema(list(kinds.items()))
+    for rows in (5, 1, 0):
+        part = {name: values[:rows] for name, values in columns.items()}
+        found, expected = table_of(part, schema), pa.table({name: part[name] for name in kinds}, schema=schema)
+        found.validate(full=True)
+        assert found.schema == expected.schema
+        assert repr(found.to_pylist()) == repr(expected.to_pylist())
+        assert table_bytes(found) == table_bytes(expected)
+    code = (
+        "import sys, pyarrow as pa; from workbench.parquet_columns import table_of;"
+        " table_of({'a': ['x', None]}, pa.schema([('a', pa.string())])); assert 'pandas' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -14,6 +15,7 @@ from workbench.errors import OutputError
 from workbench.reading import read_bytes
 from workbench.records import short
 
+NUMPY_TYPES = {pa.int64(): np.int64, pa.float64(): np.float64}
 MOST_VALUES = 200_000_000
 """Rows times columns that are read at once, 1.6 GB: ten bytes of a file can stand for a million rows."""
 
@@ -35,6 +37,25 @@ def _column(values: np.ndarray) -> pa.Array:
     gaps = np.isnan(numbers)
     known = pa.py_buffer(np.packbits(~gaps, bitorder="little")) if gaps.any() else None
     return pa.Array.from_buffers(pa.float32() if single else pa.float64(), len(numbers), [known, pa.py_buffer(numbers)])
+
+
+def table_of(columns: Mapping[str, Sequence[Any]], schema: pa.Schema) -> pa.Table:
+    """Return a table of texts, whole numbers and numbers, None as a gap; `pyarrow.table` imports pandas for it."""
+    return pa.table([_array(columns[field.name], field.type) for field in schema], schema=schema)
+
+
+def _array(values: Sequence[Any], kind: pa.DataType) -> pa.Array:
+    known = np.array([value is not None for value in values], dtype=np.bool_)
+    gaps = None if known.all() else pa.py_buffer(np.packbits(known, bitorder="little"))
+    if kind == pa.string():
+        pieces = [b"" if value is None else value.encode() for value in values]
+        ends = np.cumsum([0, *map(len, pieces)])
+        if ends[-1] > np.iinfo(np.int32).max:
+            raise ValueError(f"a column of {ends[-1]} bytes of text; allowed: {np.iinfo(np.int32).max}")
+        buffers = [gaps, pa.py_buffer(ends.astype(np.int32)), pa.py_buffer(b"".join(pieces))]
+        return pa.Array.from_buffers(kind, len(pieces), buffers)
+    numbers = np.array([0 if value is None else value for value in values], dtype=NUMPY_TYPES[kind])
+    return pa.Array.from_buffers(kind, len(numbers), [gaps, pa.py_buffer(numbers)])
 
 
 def read_columns(

@@ -10,6 +10,7 @@ import pyarrow as pa
 from workbench.campaign import store
 from workbench.control.names import CONTROL, ERROR_COLUMNS, ERRORS, LOOP_COLUMNS, RUNS
 from workbench.control.plan import Loop
+from workbench.parquet_columns import table_of
 from workbench.sweep import files
 from workbench.sweep.journal import NAME as JOURNAL
 from workbench.sweep.journal import Journal
@@ -47,7 +48,8 @@ def write_tables(directory: Path, loops: Sequence[Loop], records: Sequence[Recor
         (RUNS, runs, ("index", *LOOP_COLUMNS, "status", "reason", "key", *FACTS)),
         (ERRORS, errors, ("index", *LOOP_COLUMNS, *ERROR_COLUMNS)),
     ):
-        table = pa.Table.from_pylist(rows, schema=pa.schema([(column, _type_of(column)) for column in columns]))
+        schema = pa.schema([(column, _type_of(column)) for column in columns])
+        table = table_of({column: [row[column] for row in rows] for column in columns}, schema)
         files.write_bytes(directory / name, files.table_bytes(table))
 
 

@@ -21,6 +21,7 @@ import pyarrow.parquet as pq
 from workbench import reading
 from workbench.campaign import store
 from workbench.campaign.compare import Row
+from workbench.parquet_columns import table_of
 from workbench.sweep.journal import Journal
 from workbench.sweep.plan import Plan
 from workbench.sweep.record import Record
@@ -137,12 +138,14 @@ def _case_table(plan: Plan, records: Sequence[Record], facts: Sequence[str]) -> 
     columns |= {key: values[:, i] for i, key in enumerate(plan.keys)}
     columns |= {name: [r.facts.get(name) for r in records] for name in facts}
     numbers = [(name, pa.float64()) for name in (*plan.keys, *facts)]
-    return pa.table(columns, schema=pa.schema([*CASE_COLUMNS, *numbers]))
+    return table_of(columns, pa.schema([*CASE_COLUMNS, *numbers]))
 
 
 def _summary_table(plan: Plan, records: Sequence[Record]) -> pa.Table:
-    rows = [{"index": r.index, "case": plan.recipe.case_name(r.index), **row} for r in records for row in r.rows]
-    return pa.Table.from_pylist(rows, schema=SUMMARY_SCHEMA)
+    rows = [(r.index, row) for r in records for row in r.rows]
+    columns: dict[str, Any] = {name: [row.get(name) for _, row in rows] for name in SUMMARY_SCHEMA.names}
+    columns |= {"index": [index for index, _ in rows], "case": [plan.recipe.case_name(index) for index, _ in rows]}
+    return table_of(columns, SUMMARY_SCHEMA)
 
 
 def _read_table(path: Path) -> list[dict[str, Any]]:
