@@ -17,7 +17,7 @@ from test_mjcf_setup import robot
 from workbench.errors import ModelError, MotionError, ParameterError
 from workbench.mjcf.setup import Setup
 from workbench.reference import MujocoReference, crossings
-from workbench.reference.freedoms import NEARBY, check_freedoms
+from workbench.reference.freedoms import NEARBY, _loose, check_freedoms
 from workbench.reference.left_out import Touch
 from workbench.reference.pinocchio_reference import PinocchioReference
 from workbench.reference.platform_closure import PlatformCloser
@@ -155,3 +155,17 @@ def test_coordinates_that_fail_at_home_alone_are_told_by_a_pose_on_either_side(s
         PlatformCloser._refuse_dependent(closer(True), loops, np.zeros((1, 1)))
     with pytest.raises(ParameterError, match="of task coordinates rx only 0 can be chosen"):
         PlatformCloser._refuse_dependent(closer(False), loops, np.zeros((1, 1)))
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_what_is_loose_by_rounding_is_loose(size: float) -> None:
+    """Rows that depend on each other to rounding, not exactly, leave a freedom."""
+    rng = np.random.default_rng(5)
+    rows = size * rng.normal(size=(4, 3)) @ rng.normal(size=(3, 5))
+    structure: Any = SimpleNamespace(passive=np.arange(5))
+    freedoms, way = _loose(structure, rows, 1e-9)
+    assert freedoms == 2
+    assert np.abs(rows @ way).max() < 1e-12 * size
+    assert np.linalg.svd(rows, compute_uv=False)[3] > 0.0  # by rounding
+    structure = SimpleNamespace(passive=np.arange(3))
+    assert _loose(structure, rows, 1e-9)[0] == 0
