@@ -140,7 +140,8 @@ LONGER_TESTS: dict[str, tuple[str, ...]] = {
     "reference/": (
         "compiled_closure", "reference_closure", "motion_along", "reference_linear", "counted_forces", "tolerances",
         "large_machines", "reference_evidence", "variants", "shelf", "mjcf_assumptions", "seen_from_the_base", "sides",
-        "platform_side", "plant_terms",
+        "platform_side", "plant_terms", "reference_thresholds", "task_coordinates", "scattered_branch", "model_command",
+        "statements", "pinocchio_reference",
     ),
 }  # fmt: skip
 """Test files that what survives a short run has to survive as well, compiled and however long a test takes."""
