@@ -12,6 +12,7 @@ from small_campaign import Workbench
 from workbench.errors import SpecError
 from workbench.robots.catalogue import robot_beside
 from workbench.robots.places import ELEMENT_OF, KINDS, _product, parse_place
+from workbench.robots.robot_file import read_robot_file
 
 MISTAKES = {
     "unknown key": ("actuated =", "actuatd =", ("actuatd: unknown key", 'did you mean "actuated"')),
@@ -120,3 +121,17 @@ def test_a_robot_file_beside_a_model_speaks_for_that_model_alone(tmp_path: Path)
         robot_beside(folder / "fivebar.xml")
     (folder / "robot.toml").unlink()
     assert robot_beside(folder / "fivebar.xml") is None
+
+
+def test_robot_files_are_the_same_where_they_say_the_same(tmp_path: Path) -> None:
+    folder = tmp_path / "robot"
+    shutil.copytree(Path(__file__).resolve().parents[1] / "examples" / "fivebar", folder)
+    one, again = read_robot_file(folder / "robot.toml"), read_robot_file(folder / "robot.toml")
+    assert one == again
+    assert len({one, again}) == 1
+    text = (folder / "robot.toml").read_text(encoding="utf-8")
+    (folder / "robot.toml").write_text(text.replace('title = "', 'title = "another ', 1), encoding="utf-8")
+    other = read_robot_file(folder / "robot.toml")
+    assert one != other
+    assert one != folder / "robot.toml"
+    assert len({one, again, other}) == 2
