@@ -20,7 +20,7 @@ from workbench import MujocoReference, load_mechanism
 from workbench.errors import ModelError, OutputError, ParameterError, WorkbenchError
 from workbench.mjcf.text import Edit, find, numbers_replaced, replace_numbers, scan, tokens
 from workbench.robots.assignments import parse_assignment, resolve_changes
-from workbench.robots.edit import edit_file, resolve_for
+from workbench.robots.edit import _tells, edit_file, resolve_for
 from workbench.robots.load import LoadedModel, load_model
 from workbench.robots.show import show_parameters
 from workbench.robots.values import precise, quotient
@@ -439,3 +439,20 @@ def test_elements_of_an_edited_text_are_those_that_a_scan_of_it_finds(mark: str)
     assert moved == scan(changed, "m")
     # and that is something: without moving them they are others
     assert elements != scan(changed, "m")
+
+
+@pytest.mark.parametrize(
+    ("number", "tells"),
+    [
+        ("0.2", True),
+        ("5.", True),
+        ("12", True),
+        ("250", True),
+        ("100", True),
+        ("5", False),
+        ("50", False),
+        ("0", False),
+    ],
+)
+def test_a_number_in_a_comment_that_is_more_than_a_counter(number: str, tells: bool) -> None:
+    assert _tells(number) is tells
