@@ -515,3 +515,15 @@ def test_two_results_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[
     (tmp_path / "c").write_text("{}")
     with pytest.raises(SystemExit, match="no benchmark result"):
         compare.load(str(tmp_path / "c"))
+
+
+@both_robots
+@pytest.mark.parametrize("joint", range(3))
+def test_one_torque_that_is_not_finite_is_enough_to_refuse_a_sample(robot: str, joint: int) -> None:
+    mechanism = mechanism_of(robot).closed_form
+    q, qd, qdd = state(mechanism_of(robot), 3)
+    tau = np.ones((3, 3))
+    mechanism._refuse_torques(q, qd, qdd, tau)
+    tau[1, joint] = np.inf
+    with pytest.raises(MotionError, match=r"^sample 1, .*overflow"):
+        mechanism._refuse_torques(q, qd, qdd, tau)
