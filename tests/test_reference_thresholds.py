@@ -22,6 +22,7 @@ from workbench.reference.left_out import Touch
 from workbench.reference.pinocchio_reference import PinocchioReference
 from workbench.reference.platform_closure import PlatformCloser
 from workbench.reference.redundant import excess_actuators, left_null_space
+from workbench.reference.replay import motion_through
 
 WITHIN, BEYOND = 0.3, 3.0
 
@@ -169,3 +170,16 @@ def test_what_is_loose_by_rounding_is_loose(size: float) -> None:
     assert np.linalg.svd(rows, compute_uv=False)[3] > 0.0  # by rounding
     structure = SimpleNamespace(passive=np.arange(3))
     assert _loose(structure, rows, 1e-9)[0] == 0
+
+
+@pytest.mark.parametrize("length", [0.01, 1.0, 1000.0])
+def test_a_motion_is_asked_for_within_its_times_but_for_rounding(length: float) -> None:
+    t = np.linspace(3.0, 3.0 + length, 5)
+    still = np.zeros((5, 1))
+    motion = motion_through(t, still + 1.0, still, still)
+    for outside in (-1.0, 1.0):
+        end = t[0] if outside < 0 else t[-1]
+        q, _, _ = motion(np.array([end + outside * 0.3e-9 * length]))
+        assert q[0, 0] == pytest.approx(1.0)
+        with pytest.raises(MotionError, match="allowed: 3 to"):
+            motion(np.array([end + outside * 3e-9 * length]))
