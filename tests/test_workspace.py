@@ -65,6 +65,11 @@ def test_a_position_is_in_reach_where_inverse_kinematics_does_not_refuse_it(mech
         np.testing.assert_allclose(found.measures[name][found.reachable], values, rtol=1e-9)
     if mechanism.name == "planar_4rprp":  # its inverse kinematics knows one assembly; the other's counts hanging rods
         assert np.array_equal(found.reachable, ~refused)
+        a, h = mechanism.parameters.a, mechanism.parameters.h  # there the passive limb has no length
+        near = 1e-3 * a
+        assert mechanism.reach([[a, h, 0.3], [a - near, h, 0.3], [a, h + near, 0.3]]).reachable.tolist() == [
+            False, True, True,
+        ]  # fmt: skip
 
 
 def test_the_box_holds_every_pose_and_is_no_larger_than_limbs_are_long(mechanism: Robot) -> None:
