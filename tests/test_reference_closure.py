@@ -13,6 +13,7 @@ from robots import MODEL, FourBar, sine_sum, table_1, write_model
 from workbench.capabilities.robot import Robot
 from workbench.errors import ModelError, MotionError
 from workbench.reference import ReferenceResult, continuation
+from workbench.reference.closure import LoopCloser
 from workbench.reference.sides import NO_SIDES
 
 SAME = 1e-12
@@ -106,6 +107,33 @@ def test_branches_that_nearly_meet_are_told_apart(tmp_path: Path, monkeypatch: p
             x = at_rest(wb.MujocoReference(path), q[i : i + 1, None]).x[0, [0, 2]]
             wrong += bool(np.linalg.norm(x - expected[i]) > 1e-9)
     # the twin: without either guard a step ends on the other branch, closed to rounding
+    assert wrong > 3 if guard else wrong == 0
+
+
+@pytest.mark.parametrize("guard", ["", "CORRECTION", "LONGEST_STEP"])
+def test_the_slower_way_tells_branches_apart_that_nearly_meet(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, guard: str
+) -> None:
+    """The same where MuJoCo's positions close the loops, as they do where the package's own machine code does not."""
+    monkeypatch.setattr(continuation, "side_table", lambda *_: NO_SIDES)
+    if guard:
+        monkeypatch.setattr(continuation, guard, np.inf)
+    wrong = 0
+    q = np.random.default_rng(1).uniform(-6.0, 6.0, 25)
+    for branch in (1, -1):
+        model = FourBar(branch)
+        model.coupler, model.rocker = 0.2001, 0.2
+        expected = model.poses(q)[:, 3, :2]
+        made = wb.MujocoReference(write_model(tmp_path, model.bodies(), CONNECT, home=model.home()))
+        engine, structure = made._closer.engine, made._closer.structure
+        data = mujoco.MjData(engine.model)
+        for i in range(len(q)):
+            slow = LoopCloser(engine, structure, compiled=False)
+            assert slow.mechanism is None
+            data.qpos = slow.close(q[i : i + 1, None]).qpos[0]
+            mujoco.mj_kinematics(engine.model, data)
+            x = data.site_xpos[structure.platform_site][[0, 2]]
+            wrong += bool(np.linalg.norm(x - expected[i]) > 1e-9)
     assert wrong > 3 if guard else wrong == 0
 
 
