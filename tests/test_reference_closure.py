@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -89,8 +90,32 @@ def test_one_sample_asked_for_alone_is_where_it_is_among_others(tmp_path: Path) 
         assert np.abs(at_rest(fresh, q[i : i + 1]).qpos - together.qpos[i]).max() < SAME
 
 
+def by_machine_code(made: wb.MujocoReference, q: np.ndarray) -> np.ndarray:
+    """Where the coupler's end is at one sample, x and z."""
+    found: np.ndarray = at_rest(made, q).x[0, [0, 2]]
+    return found
+
+
+def by_the_slower_way(made: wb.MujocoReference, q: np.ndarray) -> np.ndarray:
+    """The same where MuJoCo's positions close the loops, as they do where the package's own machine code does not."""
+    engine, structure = made._closer.engine, made._closer.structure
+    slow = LoopCloser(engine, structure, compiled=False)
+    assert slow.mechanism is None
+    data = mujoco.MjData(engine.model)
+    data.qpos = slow.close(q).qpos[0]
+    mujoco.mj_kinematics(engine.model, data)
+    found: np.ndarray = data.site_xpos[structure.platform_site][[0, 2]]
+    return found
+
+
+@pytest.mark.parametrize("end", [by_machine_code, by_the_slower_way])
 @pytest.mark.parametrize("guard", ["", "CORRECTION", "LONGEST_STEP"])
-def test_branches_that_nearly_meet_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, guard: str) -> None:
+def test_branches_that_nearly_meet_are_told_apart(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    guard: str,
+    end: Callable[[wb.MujocoReference, np.ndarray], np.ndarray],
+) -> None:
     """A tenth of a millimetre parts the branches where all bars are in line; every sample is reached past that."""
     # the rule of test_sides.py alone would do it; these stand for branches that have a third between them
     monkeypatch.setattr(continuation, "side_table", lambda *_: NO_SIDES)
@@ -104,36 +129,9 @@ def test_branches_that_nearly_meet_are_told_apart(tmp_path: Path, monkeypatch: p
         path = write_model(tmp_path, model.bodies(), CONNECT, home=model.home())
         expected = model.poses(q)[:, 3, :2]
         for i in range(len(q)):  # each alone, so that none is a stone to step on for another
-            x = at_rest(wb.MujocoReference(path), q[i : i + 1, None]).x[0, [0, 2]]
+            x = end(wb.MujocoReference(path), q[i : i + 1, None])
             wrong += bool(np.linalg.norm(x - expected[i]) > 1e-9)
     # the twin: without either guard a step ends on the other branch, closed to rounding
-    assert wrong > 3 if guard else wrong == 0
-
-
-@pytest.mark.parametrize("guard", ["", "CORRECTION", "LONGEST_STEP"])
-def test_the_slower_way_tells_branches_apart_that_nearly_meet(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, guard: str
-) -> None:
-    """The same where MuJoCo's positions close the loops, as they do where the package's own machine code does not."""
-    monkeypatch.setattr(continuation, "side_table", lambda *_: NO_SIDES)
-    if guard:
-        monkeypatch.setattr(continuation, guard, np.inf)
-    wrong = 0
-    q = np.random.default_rng(1).uniform(-6.0, 6.0, 25)
-    for branch in (1, -1):
-        model = FourBar(branch)
-        model.coupler, model.rocker = 0.2001, 0.2
-        expected = model.poses(q)[:, 3, :2]
-        made = wb.MujocoReference(write_model(tmp_path, model.bodies(), CONNECT, home=model.home()))
-        engine, structure = made._closer.engine, made._closer.structure
-        data = mujoco.MjData(engine.model)
-        for i in range(len(q)):
-            slow = LoopCloser(engine, structure, compiled=False)
-            assert slow.mechanism is None
-            data.qpos = slow.close(q[i : i + 1, None]).qpos[0]
-            mujoco.mj_kinematics(engine.model, data)
-            x = data.site_xpos[structure.platform_site][[0, 2]]
-            wrong += bool(np.linalg.norm(x - expected[i]) > 1e-9)
     assert wrong > 3 if guard else wrong == 0
 
 
